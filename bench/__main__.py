@@ -14,6 +14,7 @@ from rich.console import Console
 
 from bench.speed import (
     batches,
+    bricks,
     certificates,
     export,
     fields,
@@ -34,6 +35,7 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "nearest": nearest.run,
     "ticks": ticks.run,
     "fields": fields.run,
+    "bricks": bricks.run,
     "simulation": simulation.run,
     "recording": recording.run,
     "servo": servo.run,

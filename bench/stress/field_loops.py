@@ -20,7 +20,7 @@ from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
 from asperity.rendering import bake
 from asperity.surface import Surface
-from asperity.textures.fields.field_sampler import KNOT, FieldArguments
+from asperity.textures.fields.field_record import KNOT, FieldArguments
 from asperity.textures.fields.potential_field import PotentialField
 
 K = 1000.0

@@ -51,10 +51,11 @@ def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
         records.insert(0, _render("field_data.c", values))
         return _program_files(request, functions, values, "\n".join(records))
     arrays = [store.definition(place) for place in places]
+    lines = _render("lines.h", values) * any(map(store.has_lines, places))
     if request.as_library or size <= MAX_HEADER_DATA:
-        data = "\n".join([f"static {array}" for array in arrays])
+        data = lines + "\n".join([f"static {array}" for array in arrays])
         return _program_files(request, functions, values, "\n".join([data, *records]))
-    declared = "".join([f"extern {store.declaration(place)};\n" for place in places])
+    declared = lines + "".join([f"extern {store.declaration(place)};\n" for place in places])
     data = _render("extern.h", values | {"declared": declared})
     files = _program_files(request, functions, values, "\n".join([data, *records]))
     head = f"{values['note']}#include <stdint.h>\n\n{declared}\n"

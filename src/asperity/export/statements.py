@@ -134,7 +134,10 @@ class FunctionPrinter(ast.NodeVisitor):
         return [f"return {self.expressions.as_type(node.value, self.types.result_type)};"]
 
     def visit_If(self, node: ast.If) -> list[str]:
-        """Return the lines of a branch."""
+        """Return the lines of a branch, of the one that is taken where the test is constant."""
+        taken = self._constant_test(node.test)
+        if taken is not None:
+            return self._block(node.body if taken else node.orelse)
         test = self.expressions.condition(node.test)
         if _returns_zeros(node.body[0]):
             test = f"{self.program.prefix.upper()}_RARE({test})"
@@ -145,6 +148,15 @@ class FunctionPrinter(ast.NodeVisitor):
         if node.orelse:
             lines += ["} else {", *_indent(self._block(node.orelse))]
         return [*lines, "}"]
+
+    def _constant_test(self, node: ast.expr) -> bool | None:
+        """Return whether a number of the program is greater than another; None for other tests."""
+        if not isinstance(node, ast.Compare) or not isinstance(node.ops[0], ast.Gt):
+            return None
+        left, right = map(self.types.constant_integer, (node.left, node.comparators[0]))
+        if left is None or right is None:
+            return None
+        return left > right
 
     def visit_For(self, node: ast.For) -> list[str]:
         """Return the lines of a loop over a range."""

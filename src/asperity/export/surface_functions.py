@@ -32,6 +32,7 @@ from asperity.laws import Law
 from asperity.laws.clamps import Clamp
 from asperity.rendering import is_searched
 from asperity.surface import Surface
+from asperity.textures.fields.field_record import BRICK_ENTRIES
 
 PRECISIONS = ("double", "float")
 MAX_DATA_SIZE = 64 * 2**20
@@ -222,6 +223,7 @@ _SCALAR_TYPES = {
     "float32": c.SINGLE,
     "int64": c.INT,
     "int32": c.INT,
+    "int16": c.INT,
     "bool": c.BOOL,
 }
 _WIDTH = 100
@@ -272,8 +274,14 @@ class ProgramData:
         c_type = self._c_type(_element_type(values))
         if c_type == "int64_t" and _fits_32_bits(values):
             c_type = "int32_t"
+        if self.has_lines(name):
+            c_type = f"int16_t {self.prefix.upper()}_LINES"
         lengths = "".join([f"[{max(length, 1)}]" for length in values.shape])
         return f"const {c_type} {name}{lengths}"
+
+    def has_lines(self, name: str) -> bool:
+        """Return whether the rows of an array are aligned lines of the cache: bricks."""
+        return bool(self.values[name].dtype == np.int16)
 
     def definition(self, name: str) -> str:
         """Return the definition of an array, without storage class."""
@@ -282,6 +290,8 @@ class ProgramData:
     def size_in_bytes(self, name: str) -> int:
         """Return the size of an array in the program [bytes]."""
         values = self.values[name]
+        if self.has_lines(name):
+            return int(values.nbytes)
         narrow = {c.FLOAT: self.single, c.INT: _fits_32_bits(values)}
         item_size = 4 if narrow.get(_element_type(values), True) else 8
         return int(values.size) * item_size
@@ -311,6 +321,7 @@ class ProgramData:
 _LOADED_LENGTHS = {
     "c": ("{0}.count",),
     "columns": ("{0}.rows", "{0}.width", "4"),
+    "bricks": ("{0}.brick_count", str(BRICK_ENTRIES)),
     "stretched_cells": ("{0}.stretched", "7"),
 }
 

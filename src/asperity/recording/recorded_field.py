@@ -9,7 +9,7 @@ import importlib
 import io
 import sys
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, content_digest, text_digest, to_plain_data
+from asperity.core.files import Serializable, content_digest, set_values, text_digest, to_plain_data
 from asperity.kernels.fuse import fuse_on_texture, kernel_source
 from asperity.kernels.tick import least_limited_square
 from asperity.laws import Law, find_law
@@ -141,9 +141,9 @@ def field_metadata(surface: Surface) -> dict[str, Any]:
     }
 
 
-def arguments_digest(arguments: Iterable[Any]) -> str:
+def arguments_digest(arguments: tuple[Any, ...]) -> str:
     """Return a digest of the record that a sampler receives."""
-    return content_digest(*map(np.asarray, arguments))
+    return content_digest(*map(np.asarray, set_values(arguments)))
 
 
 def formula_digest(law: Law) -> str:
@@ -174,7 +174,9 @@ def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
     try:
         law = find_law(str(metadata["law"]))
         clamp = find_clamp(str(metadata["clamp"]))
-        sampler = tuple([_sampler_module(str(name)) for name in metadata["sampler"]])
+        modules = [_sampler_module(str(name)) for name in metadata["sampler"]]
+        parts = [part for module in modules for part in getattr(module, "PARTS", ())]
+        sampler = tuple(dict.fromkeys([*modules, *parts]))
         kind = getattr(sampler[0], str(metadata["record"]))
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             values = [_to_scalar(archive[name]) for name in archive.files]

@@ -13,7 +13,7 @@ from asperity.kernels import fuse
 from asperity.textures.fields import field_certificate
 from asperity.textures.fields.field_certificate import curvature_bounds
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC
+from asperity.textures.fields.field_record import MIRRORED, PERIODIC
 
 
 def grid(border: int, cells: tuple[int, int] = (40, 4)) -> FieldGrid:

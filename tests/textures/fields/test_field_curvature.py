@@ -11,12 +11,8 @@ from asperity.core.checks import FloatArray
 from asperity.textures.fields import field_curvature as hull
 from asperity.textures.fields.field_certificate import cells_above, hull_weights, product_weights
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
-from asperity.textures.fields.field_sampler import (
-    MIRRORED,
-    PERIODIC,
-    FieldArguments,
-    field_expansion,
-)
+from asperity.textures.fields.field_record import MIRRORED, PERIODIC, FieldArguments
+from asperity.textures.fields.field_sampler import field_expansion
 
 RNG = np.random.default_rng(32)
 STEPS = np.array([[1.0, 0.2], [-0.1, 1.3]])

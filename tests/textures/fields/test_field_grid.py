@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import END, FIRST, MIRRORED, PERIODIC, REACH, ZERO
+from asperity.textures.fields.field_record import END, FIRST, MIRRORED, PERIODIC, REACH, ZERO
 from asperity.textures.fields.node_potentials import smooth
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.spline.spline_texture import HeightMap

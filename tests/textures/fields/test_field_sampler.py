@@ -13,7 +13,7 @@ from scipy.interpolate import BSpline
 from asperity.core.checks import FloatArray
 from asperity.textures.fields import field_sampler as kernels
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
-from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+from asperity.textures.fields.field_record import MIRRORED, PERIODIC, ZERO, FieldArguments
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.spline.bspline_kernels import fold_coordinate
 

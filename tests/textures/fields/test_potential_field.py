@@ -15,7 +15,7 @@ from asperity.analysis.energy.field_energy import split_state
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.surface import Surface
-from asperity.textures.fields.field_sampler import FieldArguments
+from asperity.textures.fields.field_record import FieldArguments
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -249,9 +249,11 @@ def test_file_of_another_version_is_refused_with_the_remedy(tmp_path: Path) -> N
     path = tmp_path / "map.field"
     asp.save_field(path, field_of(baked("map")[0]))
     content = bytearray(path.read_bytes())
-    content[8] += 1
+    content[8] = 5
     path.write_bytes(content)
-    with pytest.raises(SurfaceFileError, match=r"map\.field: is a \.field file of version 4.*bake"):
+    with pytest.raises(
+        SurfaceFileError, match=r"map\.field: is a \.field file of version 5.*2 to 4.*bake"
+    ):
         Surface(path, "H")
 
 

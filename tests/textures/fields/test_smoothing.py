@@ -13,7 +13,7 @@ from asperity.analysis.energy.field_energy import split_state
 from asperity.surface import Surface
 from asperity.textures.fields.bake import BakeGoal, bake_texture
 from asperity.textures.fields.field_grid import RAMP, FieldGrid
-from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
+from asperity.textures.fields.field_record import MIRRORED, PERIODIC, ZERO
 from asperity.textures.fields.node_potentials import smooth, spread_marks
 from asperity.textures.fields.potential_field import PotentialField
 from asperity.textures.spline.spline_texture import HeightMap, Profile

@@ -14,8 +14,10 @@ from asperity.core.units import round_up
 from asperity.laws import LAWS
 from asperity.laws.clamps import NONE
 from asperity.textures.fields import node_potentials
+from asperity.textures.fields.field_bricks import BRICK_BYTES
 from asperity.textures.fields.field_certificate import Progress, cells_above, certify_gain
 from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray
+from asperity.textures.fields.field_record import FieldArguments, largest_coefficient, largest_step
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
 from asperity.textures.texture import Texture
 
@@ -47,6 +49,8 @@ _BYTES_PER_NODE = 4
 # Height of the cells in which a field fades below its floor, over the range of the vertical force
 # there.
 _FADE = 0.8
+# Greatest q that rounding to bricks was measured to add: 0.001 to 0.010.
+_GAIN_OF_ROUNDING = 0.01
 # Growth of cells with depth over the share of the goal, of which it then causes about half however
 # close nodes are, and the most.
 _GROWTH_PER_SHARE = 3.0
@@ -291,27 +295,14 @@ class BakePlan:
             grid: the nodes.
             progress: called with the finished fraction.
         """
-        passes = 0
-        before = np.inf
-        ramp = RAMP
-        cells = np.ones(grid.node_counts, np.uint8)
-        limit = self.goal.max_gain * self.gain
-        while True:
-            arguments = grid.arguments(potentials, self.lift)
-            cells = cells_above(arguments, limit, cells)
-            count = int(np.count_nonzero(cells))
-            if passes == self.goal.passes or count == 0:
-                break
-            # What is left is due to the borders of smoothed parts: they are widened.
-            if count > _STALLED * before:
-                ramp = 2 * ramp + 1
-            before = count
-            weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
-            node_potentials.smooth(potentials, weights, grid)
-            passes += 1
+        is_large = potentials.nbytes > BRICK_BYTES
+        limit = self.goal.max_gain * self.gain - _GAIN_OF_ROUNDING * is_large
+        arguments, passes = self._smooth(potentials, grid, limit)
+        if is_large:
+            arguments = grid.to_bricks(potentials, arguments)
         gain, one_sided = certify_gain(grid, arguments, progress)
-        largest = float(arguments.c.max(initial=0.0))
-        force, energy = grid.error_bounds(self.lipschitz, passes, largest)
+        sizes = largest_coefficient(arguments), largest_step(arguments)
+        force, energy = grid.error_bounds(self.lipschitz, passes, *sizes)
         field = PotentialField(
             self.texture,
             grid,
@@ -336,6 +327,28 @@ class BakePlan:
             onset_places=len(shift),
         )
         return field
+
+    def _smooth(
+        self, potentials: SingleArray, grid: FieldGrid, limit: float
+    ) -> tuple[FieldArguments, int]:
+        """Smooth potentials until no gain is above a limit; return the field and the passes."""
+        passes = 0
+        before = np.inf
+        ramp = RAMP
+        cells = np.ones(grid.node_counts, np.uint8)
+        while True:
+            arguments = grid.arguments(potentials, self.lift)
+            cells = cells_above(arguments, limit, cells)
+            count = int(np.count_nonzero(cells))
+            if passes == self.goal.passes or count == 0:
+                return arguments, passes
+            # What is left is due to the borders of smoothed parts: they are widened.
+            if count > _STALLED * before:
+                ramp = 2 * ramp + 1
+            before = count
+            weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
+            node_potentials.smooth(potentials, weights, grid)
+            passes += 1
 
 
 def _between(resolution: float, limits: list[float], ends: tuple[float, float]) -> float:

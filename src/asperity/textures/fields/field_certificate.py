@@ -12,13 +12,16 @@ from asperity.core.checks import FloatArray
 from asperity.core.processes import run_in_threads
 from asperity.textures.fields import field_curvature, field_sampler
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import (
+from asperity.textures.fields.field_record import (
     OFFSETS,
     PERIODIC,
     RATE,
     UPPER,
     ZERO,
     FieldArguments,
+    field_rows,
+    field_width,
+    largest_coefficient,
 )
 from asperity.textures.texture import CertifiedNumber
 
@@ -56,7 +59,9 @@ def curvature_bounds(
     if grid.border != ZERO:
         bounds[0, :2] = 1.0  # of the flat wall far below
     numbers = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, progress)
-    largest = float(field.c.max(initial=0.0) + field.stretched_cells[:, OFFSETS:].max(initial=0.0))
+    largest = largest_coefficient(field) + float(
+        field.stretched_cells[:, OFFSETS:].max(initial=0.0)
+    )
     rounding = _DIFFERENCE_ROUNDING * (largest / min(grid.spacing)) ** 2
     best = numbers[np.argmax(numbers[:, :, 1], axis=0), [0, 1]]
     at = grid.positions(best[:, 2 : 2 + len(grid.cells)])
@@ -85,7 +90,7 @@ def cells_above(field: FieldArguments, limit: float, cells: NDArray[np.uint8]) -
     A cell is named by the node in its middle; the shape is that of the nodes.
     """
     marks = cells.copy()
-    whole = marks if field.columns.shape[0] > 1 else marks[:, None]
+    whole = marks if field_rows(field) > 1 else marks[:, None]
     _search(np.full((2, 5), limit), whole, field, None)
     return marks
 
@@ -96,9 +101,9 @@ def _search(
     """Return the bounds of each part of the search, (n, 2, 5)."""
     from asperity.kernels.fuse import fuse_module
 
-    loops = fuse_module(field_curvature, field_sampler)
+    loops = fuse_module(field_curvature, field_sampler, *field_sampler.PARTS)
     weights = *hull_weights(field), *product_weights(field)
-    width = field.columns.shape[1] - 3 + (field.border != PERIODIC)
+    width = field_width(field) - 3 + (field.border != PERIODIC)
     parts = [(k, min(k + _COLUMNS_PER_PART, width)) for k in range(0, width, _COLUMNS_PER_PART)]
     numbers = np.repeat(bounds[None], len(parts), axis=0)
 
@@ -124,7 +129,7 @@ def hull_weights(field: FieldArguments) -> tuple[FloatArray, FloatArray]:
         (3, 3, 3, levels).
     """
     along = _BERNSTEIN
-    across = along if field.columns.shape[0] > 1 else np.array([1.0, 0.0, 0.0]).reshape(3, 1, 1)
+    across = along if field_rows(field) > 1 else np.array([1.0, 0.0, 0.0]).reshape(3, 1, 1)
     size = 3 * across.shape[1]
 
     def product(v: int, u: int) -> FloatArray:
@@ -165,7 +170,7 @@ def product_weights(field: FieldArguments) -> tuple[NDArray[np.int64], FloatArra
     weight = np.outer([1, 2, 1], [1, 2, 1]) / np.array([1, 4, 6, 4, 1])[place]
     places = place
     weights = weight
-    for _ in range(2 if field.columns.shape[0] > 1 else 1):
+    for _ in range(2 if field_rows(field) > 1 else 1):
         size = 3 * len(places)
         places = (5 * places[:, None, :, None] + place[:, None]).reshape(size, size)
         weights = np.kron(weights, weight)

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
-from asperity.textures.fields.field_sampler import (
+from asperity.textures.fields.field_record import (
     OFFSETS,
     PERIODIC,
-    REACH,
     FieldArguments,
+    field_reach,
+    field_rows,
     field_triple,
 )
 
@@ -280,7 +281,7 @@ def raise_bound(
     """
     sign = 1.0 - 2.0 * row
     side = 0.5 * field.fade / field.below
-    rows = min(field.columns.shape[0], 3)
+    rows = min(field_rows(field), 3)
     for n in range(125 if rows > 1 else 25):
         e = n // 25
         f = n // 5 % 5
@@ -374,18 +375,18 @@ def hull_batch(
             not change; shape of the nodes, those along x first, or empty to search the bounds.
         field: the field.
     """
-    rows = min(field.columns.shape[0], 3)
+    rows = min(field_rows(field), 3)
     size = pairs.shape[0]
     nodes = local_array((9, 34))
     mixed = local_array((6, 34))
     work = local_array((5, 32))
     hull = local_array((27, 10, 32))
     product = local_array((125, 7))
-    lines = max(field.columns.shape[0] - 3 + int(field.border != PERIODIC), 1)
+    lines = max(field_rows(field) - 3 + int(field.border != PERIODIC), 1)
     tests = marks.shape[0] > 0
     for i in range(lines):
         for j in range(first, last):
-            end = min(int(field.columns[i + rows // 2, j + 1, REACH]) + 1, field.levels - 1)
+            end = min(field_reach(i + rows // 2, j + 1, field) + 1, field.levels - 1)
             m = 1
             if tests:
                 marks[j, i, :1] = 0

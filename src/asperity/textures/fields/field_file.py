@@ -1,8 +1,9 @@
 """Files of baked fields: little-endian, versioned, checked, and read into memory.
 
-A file is a header of 256 bytes (:data:`HEADER`), the table of columns, the coefficients, the
-heights of a texture that is a spline, and a description as JSON. A C program needs the header, the
-columns and the coefficients; the description holds the certified numbers and the source.
+A file is a header of 256 bytes (:data:`HEADER`), the table of columns, the coefficients, one by
+one or in bricks, the heights of a texture that is a spline, and a description as JSON. A C program
+needs the header, the columns and the coefficients; the description holds the certified numbers and
+the source.
 """
 
 from __future__ import annotations
@@ -23,15 +24,25 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.files import content_digest, json_text, open_atomic, open_input
 from asperity.core.memory import free_memory
+from asperity.textures.fields.field_bricks import align_bricks
 from asperity.textures.fields.field_certificate import certify_gain
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+from asperity.textures.fields.field_record import (
+    BRICK_ENTRIES,
+    MIRRORED,
+    PERIODIC,
+    ZERO,
+    FieldArguments,
+    field_rows,
+    field_width,
+)
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField, ThinRegion
 from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import CertifiedNumber, Texture
 
 MAGIC = b"ASPFIELD"
-VERSION = 3
+VERSION = 4
+_WITHOUT_BRICKS = 3  # the version of fields that have none
 _UNSTRETCHED = 2  # the version before, whose cells are equally high
 _BYTE_ORDER = 0x01020304
 _ALIGNMENT = 4096
@@ -43,6 +54,8 @@ _TUPLES = {"at", "depths", "shares", "presses"}
 """Tuples of numbers in the description; all others are single numbers."""
 _SCALARS = ("x0", "y0", "z0", "m00", "m01", "m10", "m11", "iz", "margin", "lift")
 _NUMBERS = (*_SCALARS, "floor", "fade")
+_BRICK_NUMBERS = ("unit", "excess_rows", "excess_columns")
+_SECTIONS = ("columns", "stretched", "values", "bricks", "heights", "json")
 
 HEADER = np.dtype(
     [
@@ -66,7 +79,12 @@ HEADER = np.dtype(
         ("stretched", "<u4"),
         ("stretched_offset", "<u8"),  # float64 (stretched, 7)
         ("fade", "<f8"),  # twice the height of the cells below the floor [m]
-        ("reserved", "V48"),
+        ("bricks_offset", "<u8"),  # int16 (brick_count, 32)
+        ("unit", "<f8"),  # least step of the coefficients of bricks [m]
+        ("brick_count", "<u4"),
+        ("excess_rows", "<u4"),
+        ("excess_columns", "<u4"),
+        ("reserved", "V20"),
         ("checksum", "<u4"),  # CRC-32 of all that follows the header
         ("header_checksum", "<u4"),  # CRC-32 of the header before this entry
     ]
@@ -113,6 +131,7 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
         np.ascontiguousarray(record.columns, "<i4").tobytes(),
         np.ascontiguousarray(record.stretched_cells, "<f8").tobytes(),
         np.ascontiguousarray(record.c, "<f4").tobytes(),
+        np.ascontiguousarray(record.bricks, "<i2").tobytes(),
         np.ascontiguousarray(heights, "<f8").tobytes(),
         description,
     ]
@@ -123,16 +142,16 @@ def _encode(field: PotentialField) -> tuple[NDArray[Any], list[tuple[int, bytes]
         end = offsets[-1] + len(part)
     header = np.zeros((), HEADER)
     header["magic"] = MAGIC
-    header["version"] = VERSION
+    header["version"] = VERSION if len(record.bricks) else _WITHOUT_BRICKS
     header["byte_order"] = _BYTE_ORDER
     header["file_bytes"] = end
     header["count"] = record.c.size
     header["rows"], header["columns"] = record.columns.shape[:2]
+    header["brick_count"] = len(record.bricks)
     header["stretched"] = len(record.stretched_cells)
-    names = ("columns_offset", "stretched_offset", "values_offset", "heights_offset", "json_offset")
-    for name, offset in zip(names, offsets, strict=True):
-        header[name] = offset
-    for name in (*_NUMBERS, *_COUNTS):
+    for name, offset in zip(_SECTIONS, offsets, strict=True):
+        header[f"{name}_offset"] = offset
+    for name in (*_NUMBERS, *_COUNTS, *_BRICK_NUMBERS):
         header[name] = getattr(record, name)
     header["q"] = field.gain.upper
     sections = list(zip(offsets, parts, strict=True))
@@ -202,9 +221,14 @@ def _decode(data: NDArray[np.uint8], build_texture: BuildTexture) -> PotentialFi
         numbers["fade"] = 2.0 * numbers["below"] / numbers["iz"]
     cells = _section(data, header["stretched_offset"], 7 * int(header["stretched"]), "<f8")
     record = FieldArguments(values, columns.reshape(shape), cells.reshape(-1, 7), **numbers)
+    if header["brick_count"]:
+        size = int(header["brick_count"]) * BRICK_ENTRIES
+        bricks = _section(data, header["bricks_offset"], size, "<i2")
+        parts = {name: header[name].item() for name in _BRICK_NUMBERS}
+        record = record._replace(bricks=bricks.reshape(-1, BRICK_ENTRIES), **parts)
     count = math.prod(described["shape"]) * bool(described["shape"])
     heights = _section(data, header["heights_offset"], count, "<f8")
-    field = assemble_field(record, described, heights, build_texture)
+    field = assemble_field(align_bricks(record), described, heights, build_texture)
     _check_scales(header, field)
     return field
 
@@ -317,8 +341,8 @@ def _read_header(data: NDArray[np.uint8]) -> Any:
     header = data[: HEADER.itemsize].view(HEADER)[0]
     if header["byte_order"] != _BYTE_ORDER:
         raise SurfaceFileError("has another byte order, or is damaged")
-    if header["version"] not in (_UNSTRETCHED, VERSION):
-        known = f"{_UNSTRETCHED} and {VERSION} are read"
+    if header["version"] not in range(_UNSTRETCHED, VERSION + 1):
+        known = f"{_UNSTRETCHED} to {VERSION} are read"
         fault = f"is a .field file of version {header['version']}, of which {known}"
         raise SurfaceFileError(f"{fault}; bake it again")
     if header["header_checksum"] != zlib.crc32(data[: HEADER.itemsize - 4].data):
@@ -338,18 +362,21 @@ def _check_record(record: FieldArguments, grid: FieldGrid) -> None:
     """
     offset, first, end, reach = np.moveaxis(record.columns.astype(np.int64), -1, 0)
     rows = 1 if len(grid.cells) == 1 else grid.cells[1] + 3
-    fits = record.columns.shape == (rows, grid.cells[0] + 3, 4) and record.levels >= 3
+    shape = field_rows(record), field_width(record)
+    fits = shape == (rows, grid.cells[0] + 3) and record.levels >= 3
     fits = fits and record.border in (PERIODIC, MIRRORED, ZERO)
     fits = fits and 1 <= record.below <= record.levels - 2
     fits = fits and record.stretched_cells.shape == grid.stretched_table().shape
     fits = fits and len(record.stretched_cells) < record.levels
+    fits = fits and 0 <= max(record.excess_rows, record.excess_columns) <= len(record.bricks)
+    count = len(record.bricks) or record.c.size
     ordered = (first >= 0) & (first <= end) & (reach >= 0) & (reach <= record.levels)
-    stored = (first == end) | ((offset + first >= 0) & (offset + end <= record.c.size))
-    numbers = np.array([getattr(record, name) for name in _NUMBERS])
+    stored = (first == end) | ((offset + first >= 0) & (offset + end <= count))
+    numbers = np.array([getattr(record, name) for name in (*_NUMBERS, "unit")])
     if not (fits and ordered.all() and stored.all()):
         raise SurfaceFileError("has a damaged table of columns")
     finite = [np.isfinite(part).all() for part in (numbers, record.c, record.stretched_cells)]
-    if not (all(finite) and record.iz > 0.0 and record.fade > 0.0):
+    if not (all(finite) and min(record.iz, record.fade, record.unit) > 0.0):
         raise SurfaceFileError("has numbers that are not finite")
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.textures.domain import Domain
-from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO, FieldArguments
+from asperity.textures.fields.field_bricks import BrickPacker
+from asperity.textures.fields.field_record import MIRRORED, PERIODIC, ZERO, FieldArguments
 
 # Weight of both neighbours of a node along an axis in a smoothing pass.
 NEIGHBOUR_WEIGHT = 0.125
@@ -224,7 +225,7 @@ class FieldGrid:
         return math.sqrt(square)
 
     def error_bounds(
-        self, gain: float, passes: int = 0, largest: float = 0.0
+        self, gain: float, passes: int = 0, largest: float = 0.0, step: float = 0.0
     ) -> tuple[float, float]:
         """Return proved bounds of |∇T - ∇U| [m] and of |T - U| [m²] above ``bounded_floor``.
 
@@ -242,8 +243,10 @@ class FieldGrid:
             gain: Lipschitz constant L of ∇U [1].
             passes: number of smoothing passes.
             largest: greatest coefficient that is stored in single precision [m].
+            step: greatest step to which coefficients are rounded further [m].
         """
         rounding = (3.0 + 5.0 * passes) * largest * 0.5 * float(np.finfo(np.float32).eps)
+        rounding += 0.5 * step
         steps = np.array(self.spacing)
         spread = self.spread(passes)
         square = np.square(steps)
@@ -268,7 +271,7 @@ class FieldGrid:
             lift: vertical force over the stiffness below the floor, less the depth there, at least
                 about [m].
         """
-        rows = np.swapaxes(depths if len(self.cells) == 2 else depths[:, None], 0, 1)
+        rows = self._rows(depths)
         # One row after the other, since masks of a large field would take more memory than it does.
         cut = (_CUT - 1.0) * self.margin
         offsets = self.offsets().astype(np.float32)
@@ -283,9 +286,27 @@ class FieldGrid:
             values[start : start + len(part)] = part
         table = np.stack([starts - first, first, end, reach], axis=-1).astype(np.int32)
         table = self._with_borders(table)
-        counts = {"levels": self.levels, "below": self.below, "border": self.border}
+        counts: dict[str, Any] = {"levels": self.levels, "below": self.below, "border": self.border}
         stretched_cells = self.stretched_table()
         return FieldArguments(values, table, stretched_cells, **self.scales(), lift=lift, **counts)
+
+    def to_bricks(self, depths: SingleArray, field: FieldArguments) -> FieldArguments:
+        """Return the record of a field with its coefficients rounded to bricks.
+
+        Args:
+            depths: see :meth:`arguments`.
+            field: its record for them.
+        """
+        rows = self._rows(depths)
+        nodes = self.stored_nodes(1) if len(rows) > 1 else np.zeros(1, np.intp)
+        places = nodes, self.stored_nodes(0)
+        offsets = self.offsets().astype(np.float32)
+        packed = BrickPacker(rows, offsets, self.margin, places, field.columns).pack()
+        return field._replace(c=np.empty(0, np.float32), **packed)
+
+    def _rows(self, depths: SingleArray) -> SingleArray:
+        """Return depths with the second axis first, which has one node for a profile."""
+        return np.swapaxes(depths if len(self.cells) == 2 else depths[:, None], 0, 1)
 
     def scales(self) -> dict[str, Any]:
         """Return the numbers of the record that follow from the nodes."""

@@ -6,6 +6,8 @@ conservative and continuous whatever the coefficients are, and takes 27 of them.
 stored by columns of nodes along z, each from its first to its last coefficient that is not zero;
 outside of a column they are zero.
 
+Those of a large field are stored in bricks; the sums of a tick have one order either way.
+
 The knots along z are equally spaced down to the lowest place of a surface, and ever farther apart
 below, where the depth changes slowly with z. There the coefficients are those of S less the height
 of a knot above z, which keeps them small: they are stored in single precision.
@@ -16,87 +18,35 @@ to zero, and with it the variation of the force along z, while g'' makes up for 
 field ends in the curvature of the flat wall. The field of a closed body ends inside its grid.
 """
 
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import EVERY_FUNCTION, Kernels
+from asperity.core.compiled import EVERY_FUNCTION, Kernels, local_array
+from asperity.textures.fields import field_record
+from asperity.textures.fields.field_record import (
+    KNOT,
+    LOWER,
+    OFFSETS,
+    PERIODIC,
+    RATE,
+    UPPER,
+    ZERO,
+    FieldArguments,
+    ThreeWeights,
+    Vector,
+    column_triple,
+    field_reach,
+    field_rows,
+    field_triple,
+    field_width,
+    sum_levels,
+)
+from asperity.textures.spline import bspline_kernels
 from asperity.textures.spline.bspline_kernels import fold_coordinate
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)
+PARTS = (field_record, bspline_kernels)
+"""Modules whose functions it calls."""
 
-# What the field is beyond its first and last node.
-PERIODIC = 0
-MIRRORED = 1
-ZERO = 2
-
-# Entries of a column: where its node at level 0 would be stored, its first level, the level after
-# its last, and the level after the last of positive depth of it and its eight neighbours.
-OFFSET = 0
-FIRST = 1
-END = 2
-REACH = 3
-
-# Entries of a stretched cell: z of its lower knot, 1/h of its height h, h over the sum of h and the
-# height of the cell below, likewise above, and what is subtracted from the coefficients of its
-# three levels.
-KNOT = 0
-RATE = 1
-LOWER = 2
-UPPER = 3
-OFFSETS = 4
-
-ThreeWeights = tuple[float, float, float]
 SixEntries = tuple[float, float, float, float, float, float]
-Vector = tuple[float, float, float]
-
-
-class FieldArguments(NamedTuple):
-    """Record of a baked field.
-
-    Attributes:
-        c: coefficients [m], column after column.
-        columns: OFFSET, FIRST, END and REACH, shape (rows, columns, 4), with one node before the
-            first and two after the last along both axes; one row for a profile.
-        stretched_cells: KNOT, RATE, LOWER, UPPER and OFFSETS of the lowest cells, shape (n, 7); the
-            others are equally high.
-        x0: the first node [m].
-        y0: likewise.
-        z0: likewise, of equal cells down to level 0.
-        m00: nodes per metre along the first axis of the field: x.
-        m01: y.
-        m10: along the second: x.
-        m11: y.
-        iz: nodes per metre along z.
-        margin: height above the surface at which coefficients are zero [m].
-        lift: vertical force over the stiffness below the floor, less the depth, at least about [m].
-        floor: z down to which the field is that of the spline [m].
-        fade: F, twice the height of the cells below the floor [m].
-        levels: number of levels.
-        below: number of cells below the floor, at least 1.
-        border: PERIODIC, MIRRORED or ZERO.
-    """
-
-    c: NDArray[np.float32]
-    columns: NDArray[np.int32]
-    stretched_cells: FloatArray
-    x0: float
-    y0: float
-    z0: float
-    m00: float
-    m01: float
-    m10: float
-    m11: float
-    iz: float
-    margin: float
-    lift: float
-    floor: float
-    fade: float
-    levels: int
-    below: int
-    border: int
 
 
 def field_fold(u: float, cells: int, border: int) -> tuple[float, float]:
@@ -110,13 +60,13 @@ def field_coordinates(
     x: float, y: float, field: FieldArguments
 ) -> tuple[float, float, float, float]:
     """Return both coordinates inside the field, in nodes, each with the sign of its derivative."""
-    columns = field.columns
+    rows = field_rows(field)
     x -= field.x0
     y -= field.y0
-    u, u_sign = field_fold(x * field.m00 + y * field.m01, columns.shape[1] - 3, field.border)
-    if columns.shape[0] == 1:  # a profile has no second axis
+    u, u_sign = field_fold(x * field.m00 + y * field.m01, field_width(field) - 3, field.border)
+    if rows == 1:  # a profile has no second axis
         return u, u_sign, 0.0, 1.0
-    v, v_sign = field_fold(x * field.m10 + y * field.m11, columns.shape[0] - 3, field.border)
+    v, v_sign = field_fold(x * field.m10 + y * field.m11, rows - 3, field.border)
     return u, u_sign, v, v_sign
 
 
@@ -205,19 +155,6 @@ def field_descent(r: float, field: FieldArguments) -> Vector:
     return 1.0 - s, slope + beyond, value + beyond * (slope + 0.5 * beyond)
 
 
-def field_triple(i: int, j: int, m: int, field: FieldArguments) -> Vector:
-    """Return the coefficients of a column at levels m - 1, m and m + 1."""
-    start = field.columns[i, j, OFFSET] + m
-    first = field.columns[i, j, FIRST]
-    end = field.columns[i, j, END]
-    if first < m and m + 1 < end:
-        return float(field.c[start - 1]), float(field.c[start]), float(field.c[start + 1])
-    below = float(field.c[start - 1]) if first < m <= end else 0.0
-    middle = float(field.c[start]) if first <= m < end else 0.0
-    above = float(field.c[start + 1]) if first - 1 <= m < end - 1 else 0.0
-    return below, middle, above
-
-
 def field_gradient(x: float, y: float, z: float, field: FieldArguments) -> Vector:
     """Return ∇T [m]."""
     gx, gy, gz, _value = field_slope(x, y, z, field)
@@ -228,13 +165,13 @@ def field_slope(
     x: float, y: float, z: float, field: FieldArguments
 ) -> tuple[float, float, float, float]:
     """Return ∇T [m] and T [m²]."""
-    columns = field.columns
+    rows = field_rows(field)
     w = (z - field.z0) * field.iz
     u, u_sign, v, v_sign = field_coordinates(x, y, field)
     j = int(u + 0.5)
-    i, v0, v1 = field_row_weights(columns.shape[0], v)
-    rows = min(columns.shape[0], 3)
-    if w >= columns[i + rows // 2, j + 1, REACH] + 0.5 or u_sign * v_sign == 0.0:
+    i, v0, v1 = field_row_weights(rows, v)
+    reach = field_reach(i + min(rows, 3) // 2, j + 1, field)
+    if w >= reach + 0.5 or u_sign * v_sign == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     u0 = quadratic_weights(u - j)
     u1 = quadratic_weight_slopes(u - j)
@@ -242,21 +179,10 @@ def field_slope(
     m, t, rate, lower, upper = field_cell(z, field)
     w0 = level_weights(t, lower, upper)
     w1 = level_weight_slopes(t, lower, upper)
-    depth = field_offset(m, w0, field) - field.margin
-    gw = field_offset(m, w1, field)
-    gu = gv = 0.0
-    for a in range(rows):
-        value = along = upward = 0.0
-        for b in range(3):
-            c0, c1, c2 = field_triple(i + a, j + b, m, field)
-            s = w0[0] * c0 + w0[1] * c1 + w0[2] * c2
-            value += u0[b] * s
-            along += u1[b] * s
-            upward += u0[b] * (w1[0] * c0 + w1[1] * c1 + w1[2] * c2)
-        depth += v0[a] * value
-        gu += v0[a] * along
-        gv += v1[a] * value
-        gw += v0[a] * upward
+    if field.bricks.shape[0] > 0:
+        depth, gu, gv, gw = brick_sums(i, j, m, u0, u1, v0, v1, w0, w1, field)
+    else:
+        depth, gu, gv, gw = column_sums(i, j, m, u0, u1, v0, v1, w0, w1, field)
     if depth <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
     gu *= depth * u_sign
@@ -268,6 +194,73 @@ def field_slope(
         gz = share * gz - slope
         energy += added
     return field.m00 * gu + field.m10 * gv, field.m01 * gu + field.m11 * gv, gz, energy
+
+
+def column_sums(
+    i: int,
+    j: int,
+    m: int,
+    u0: ThreeWeights,
+    u1: ThreeWeights,
+    v0: ThreeWeights,
+    v1: ThreeWeights,
+    w0: ThreeWeights,
+    w1: ThreeWeights,
+    field: FieldArguments,
+) -> tuple[float, float, float, float]:
+    """Return S [m] and its derivatives along u, v and w in nodes, not of bricks."""
+    depth = field_offset(m, w0, field) - field.margin
+    gw = field_offset(m, w1, field)
+    gu = gv = 0.0
+    for a in range(min(field_rows(field), 3)):
+        value = along = upward = 0.0
+        for b in range(3):
+            c0, c1, c2 = column_triple(i + a, j + b, m, field)
+            s = w0[0] * c0 + w0[1] * c1 + w0[2] * c2
+            value += u0[b] * s
+            along += u1[b] * s
+            upward += u0[b] * (w1[0] * c0 + w1[1] * c1 + w1[2] * c2)
+        depth += v0[a] * value
+        gu += v0[a] * along
+        gv += v1[a] * value
+        gw += v0[a] * upward
+    return depth, gu, gv, gw
+
+
+def brick_sums(
+    i: int,
+    j: int,
+    m: int,
+    u0: ThreeWeights,
+    u1: ThreeWeights,
+    v0: ThreeWeights,
+    v1: ThreeWeights,
+    w0: ThreeWeights,
+    w1: ThreeWeights,
+    field: FieldArguments,
+) -> tuple[float, float, float, float]:
+    """Return the sums of :func:`column_sums` of a field in bricks, for four rows at once."""
+    sums = local_array((2, 4, 4))
+    rows = local_array((3, 4))
+    sum_levels(i >> 1, j >> 1, m, w0, w1, sums, field)
+    x = j & 1
+    y = i & 1
+    for a in range(4):
+        s0 = sums[0, x, a]
+        s1 = sums[0, x + 1, a]
+        s2 = sums[0, x + 2, a]
+        rows[0, a] = u0[0] * s0 + u0[1] * s1 + u0[2] * s2
+        rows[1, a] = u1[0] * s0 + u1[1] * s1 + u1[2] * s2
+        rows[2, a] = u0[0] * sums[1, x, a] + u0[1] * sums[1, x + 1, a] + u0[2] * sums[1, x + 2, a]
+    depth = field_offset(m, w0, field) - field.margin
+    gw = field_offset(m, w1, field)
+    gu = gv = 0.0
+    for a in range(min(field_rows(field), 3)):
+        depth += v0[a] * rows[0, a + y]
+        gu += v0[a] * rows[1, a + y]
+        gv += v1[a] * rows[0, a + y]
+        gw += v0[a] * rows[2, a + y]
+    return depth, gu, gv, gw
 
 
 def field_hessian(
@@ -295,11 +288,11 @@ def field_node_expansion(
 
     They are uu, uv, uz, vv, vz, zz.
     """
-    rows = min(field.columns.shape[0], 3)
+    rows = min(field_rows(field), 3)
     j = int(u + 0.5)
     u0 = quadratic_weights(u - j)
     u1 = quadratic_weight_slopes(u - j)
-    i, v0, v1 = field_row_weights(field.columns.shape[0], v)
+    i, v0, v1 = field_row_weights(field_rows(field), v)
     m, t, rate, lower, upper = field_cell(z, field)
     w0 = level_weights(t, lower, upper)
     w1 = level_weight_slopes(t, lower, upper)
@@ -362,8 +355,8 @@ def field_expansion(
 def sample_height(x: float, y: float, field: FieldArguments) -> float:
     """Return z [m] above which the force is zero, about 2 nodes above the surface."""
     u, _u_sign, v, _v_sign = field_coordinates(x, y, field)
-    i = min(field.columns.shape[0] // 2, 1) + int(v + 0.5)
-    return float(field.z0 + (field.columns[i, int(u + 0.5) + 1, REACH] + 0.5) / field.iz)
+    i = min(field_rows(field) // 2, 1) + int(v + 0.5)
+    return field.z0 + (field_reach(i, int(u + 0.5) + 1, field) + 0.5) / field.iz
 
 
 def closest_point_within_budget(

@@ -18,7 +18,7 @@ from asperity.laws.clamps import NONE
 from asperity.textures.fields import node_loop
 from asperity.textures.fields.field_certificate import Progress
 from asperity.textures.fields.field_grid import NEIGHBOUR_WEIGHT, RAMP, FieldGrid, SingleArray
-from asperity.textures.fields.field_sampler import MIRRORED, PERIODIC, ZERO
+from asperity.textures.fields.field_record import MIRRORED, PERIODIC, ZERO
 from asperity.textures.texture import Texture
 
 _NODES_PER_BLOCK = 10_000

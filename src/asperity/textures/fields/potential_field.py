@@ -15,10 +15,11 @@ from asperity.contacts.contact import Contact
 from asperity.core.checks import FloatArray
 from asperity.core.display import Tabular
 from asperity.core.errors import ParameterError
-from asperity.core.files import content_digest, to_plain_data
+from asperity.core.files import content_digest, set_values, to_plain_data
 from asperity.measured.lengths import format_length
+from asperity.textures.fields.field_bricks import align_bricks
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_sampler import ZERO, FieldArguments
+from asperity.textures.fields.field_record import VALUES, ZERO, FieldArguments
 from asperity.textures.texture import CertifiedNumber, Texture
 
 
@@ -155,6 +156,9 @@ class PotentialField(Texture, Tabular):
         self.history = source.history
         vars(self)["arguments"] = arguments
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state | {"arguments": align_bricks(state["arguments"])})
+
     @property
     def preparation(self) -> tuple[str, ...]:  # type: ignore[override]  # computed here
         """See :class:`Texture`; the last step is the baking."""
@@ -177,7 +181,7 @@ class PotentialField(Texture, Tabular):
             if not math.isclose(self.claimed_gain, self.gain.upper, rel_tol=1e-4):
                 q += f", computed from its coefficients: the file claims {self.claimed_gain:.4g}"
         text = (
-            f"Law H baked as a potential field: {self.arguments.c.size} nodes,"
+            f"Law H baked as a potential field: {self.nodes} nodes,"
             f" {1e6 * self.resolution:.3g} µm apart, {how}; {q};{claim}"
             f" force {100 * accuracy.share:.2g} % RMS from exact H"
             f" at the worst of {len(accuracy.depths)} {presses} (at {depth}; deeper than {deepest}"
@@ -187,9 +191,8 @@ class PotentialField(Texture, Tabular):
         return (*self.source.preparation, text)
 
     def __repr__(self) -> str:
-        size = self.arguments.c.size
         q = self.gain.upper
-        return f"<PotentialField of {self.source!r}, {size} nodes, q at most {q:.4g}>"
+        return f"<PotentialField of {self.source!r}, {self.nodes} nodes, q at most {q:.4g}>"
 
     @property
     def resolution(self) -> float:
@@ -199,15 +202,20 @@ class PotentialField(Texture, Tabular):
     @property
     def bytes(self) -> int:
         """Size of coefficients and columns in memory."""
-        return int(self.arguments.c.nbytes + self.arguments.columns.nbytes)
+        record = self.arguments
+        return int(record.c.nbytes + record.bricks.nbytes + record.columns.nbytes)
+
+    @property
+    def nodes(self) -> int:
+        """Number of stored coefficients; those of bricks include some beyond the columns."""
+        return self.arguments.c.size + self.arguments.bricks[1:, VALUES:].size
 
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
         from asperity.textures.fields import field_sampler
-        from asperity.textures.spline import bspline_kernels
 
-        return field_sampler, bspline_kernels
+        return field_sampler, *field_sampler.PARTS
 
     @cached_property
     def arguments(self) -> FieldArguments:
@@ -227,7 +235,7 @@ class PotentialField(Texture, Tabular):
         return {
             "kind": self.kind,
             "spacing": list(grid.spacing),
-            "nodes": int(self.arguments.c.size),
+            "nodes": self.nodes,
             **to_plain_data(numbers | parts | {"grid": nodes}),
             "source": source.describe(),
             "preparation": list(source.preparation),
@@ -238,13 +246,13 @@ class PotentialField(Texture, Tabular):
 
     def table_rows(self) -> list[dict[str, Any]]:
         """Return size and accuracy, in one row."""
-        numbers = self.arguments.c
         accuracy = self.accuracy
+        record = self.arguments
         return [
             {
-                "nodes": int(numbers.size),
+                "nodes": self.nodes,
                 "spacing [m]": max(self.grid.spacing),
-                "size [B]": int(numbers.nbytes),
+                "size [B]": record.c.nbytes + record.bricks.nbytes,
                 "q": self.gain.upper,
                 "share of force": accuracy.share,
                 "greatest distance of onset [m]": accuracy.onset,
@@ -304,4 +312,6 @@ class PotentialField(Texture, Tabular):
     def digest(self) -> str | None:
         """See :class:`Texture`."""
         source = self.source.digest
-        return source and content_digest(source, type(self).__qualname__, *self.arguments)
+        return source and content_digest(
+            source, type(self).__qualname__, *set_values(self.arguments)
+        )
