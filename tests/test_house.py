@@ -223,13 +223,13 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 # and press of the user, quick answers, platforms and first steps have added: 3 300 statements and
 # 1 000 lines by plan.
 
-MAX_STATEMENTS = 44_055
+MAX_STATEMENTS = 44_447
 """Statements of the package without docstrings; packing or unpacking lines does not change them."""
 
-MAX_OTHER_LINES = 7_556
+MAX_OTHER_LINES = 7_603
 """Lines with text in the package's files that are not Python."""
 
-MAX_PYTHON_FILES = 410
+MAX_PYTHON_FILES = 401
 
 MAX_FORMAT_SKIPS = 0
 """``fmt: skip`` is for tables of numbers, of which there are none."""
