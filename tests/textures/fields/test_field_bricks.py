@@ -19,10 +19,10 @@ from asperity.textures.fields.field_certificate import certify_gain
 from asperity.textures.fields.field_grid import FieldGrid, SingleArray
 from asperity.textures.fields.field_record import (
     BRICK_LEVELS,
+    BRICK_STEP,
+    BRICK_VALUES,
     MIRRORED,
     PERIODIC,
-    STEP,
-    VALUES,
     ZERO,
     FieldArguments,
 )
@@ -105,7 +105,7 @@ def test_sums_over_bricks_have_the_bits_of_those_over_columns(
     forces = [kernels.field_slope(x, y, z, bricks) for x, y, z in points.tolist()]
     assert forces == [kernels.field_slope(x, y, z, columns) for x, y, z in points.tolist()]
     assert np.count_nonzero(forces) > 20
-    bricks.bricks[1:, VALUES:] ^= 1
+    bricks.bricks[1:, BRICK_VALUES:] ^= 1
     assert forces != [kernels.field_slope(x, y, z, bricks) for x, y, z in points.tolist()]
 
 
@@ -115,7 +115,7 @@ def test_bricks_are_lines_of_the_cache() -> None:
         assert bricks.shape == (count, 32)
         assert bricks.nbytes == 64 * count
         assert bricks.ctypes.data % 64 == 0
-    assert VALUES + 4 * BRICK_LEVELS == 32
+    assert BRICK_VALUES + 4 * BRICK_LEVELS == 32
 
 
 def test_digest_of_a_field_without_bricks_is_that_before_there_were_any() -> None:
@@ -146,7 +146,7 @@ def test_what_is_certified_is_the_rounded_field(large: asp.Surface) -> None:
     numbers = certify_gain(field.grid, field.arguments)
     assert numbers == (field.gain, field.one_sided)
     rough = field.arguments._replace(bricks=field.arguments.bricks.copy())
-    rough.bricks[1:, VALUES::3] ^= 128
+    rough.bricks[1:, BRICK_VALUES::3] ^= 128
     assert certify_gain(field.grid, rough)[0].upper > field.gain.upper + 0.01
 
 
@@ -174,7 +174,7 @@ def test_file_holds_the_bricks(large: Any, tmp_path: Path) -> None:
     assert again.texture.bytes < 0.75 * 4 * again.texture.nodes
     points = np.random.default_rng(2).uniform([0.0, 0.0, -3e-4], [9e-4, 8e-4, 1e-4], (200, 3))
     np.testing.assert_array_equal(again.force(points), large.force(points))
-    assert (again.texture.arguments.bricks[:, STEP] >= 0).all()
+    assert (again.texture.arguments.bricks[:, BRICK_STEP] >= 0).all()
     assert path.read_bytes()[8] == 4
     for field in (again.texture, pickle.loads(pickle.dumps(large.texture))):
         assert field.arguments.bricks.ctypes.data % 64 == 0

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from asperity.textures.fields.field_record import (
     BRICK_ENTRIES,
     BRICK_LEVELS,
+    BRICK_PLACES,
+    BRICK_STEP,
+    BRICK_VALUES,
     END,
     FIRST,
-    HIGH,
-    LOW,
-    PLACES,
+    ORIGIN_HIGH,
+    ORIGIN_LOW,
     REACH,
-    STEP,
-    VALUES,
     FieldArguments,
 )
 
@@ -79,7 +79,7 @@ class BrickPacker:
         excess = self.slabs * BRICK_LEVELS - part.shape[-1]
         part = np.pad(part, ((0, 0), (0, 0), (0, excess)), "edge")
         bricks = part.reshape(2, -1, 2, self.slabs, BRICK_LEVELS).transpose(1, 3, 4, 2, 0)
-        return bricks.reshape(-1, self.slabs, PLACES * BRICK_LEVELS)
+        return bricks.reshape(-1, self.slabs, BRICK_PLACES * BRICK_LEVELS)
 
     def exponents(self) -> NDArray[np.int32]:
         """Return the exponents of the steps of all bricks, (rows, columns, slabs).
@@ -166,8 +166,8 @@ def _encode(values: Coefficients, exponents: NDArray[np.int32], least: int) -> N
     steps = np.rint(np.ldexp(values.astype(float), -exponents[:, None]))
     origin = np.floor(0.5 * (steps.min(axis=1) + steps.max(axis=1)))
     bricks = np.zeros((len(values), BRICK_ENTRIES), np.int16)
-    bricks[:, HIGH] = np.floor((origin + 2.0**15) * 2.0**-16)
-    bricks[:, LOW] = origin - 2.0**16 * bricks[:, HIGH].astype(float)
-    bricks[:, STEP] = np.ldexp(1.0, exponents - least)
-    bricks[:, VALUES:] = steps - origin[:, None]
+    bricks[:, ORIGIN_HIGH] = np.floor((origin + 2.0**15) * 2.0**-16)
+    bricks[:, ORIGIN_LOW] = origin - 2.0**16 * bricks[:, ORIGIN_HIGH].astype(float)
+    bricks[:, BRICK_STEP] = np.ldexp(1.0, exponents - least)
+    bricks[:, BRICK_VALUES:] = steps - origin[:, None]
     return bricks

@@ -39,13 +39,13 @@ OFFSETS = 4
 
 # Entries of a brick: high and low part of its origin in steps, its step over the least one, and its
 # coefficients less the origin in steps: level by level, in each x by x.
-HIGH = 0
-LOW = 1
-STEP = 2
-VALUES = 4
-PLACES = 4
+ORIGIN_HIGH = 0
+ORIGIN_LOW = 1
+BRICK_STEP = 2
+BRICK_VALUES = 4
+BRICK_PLACES = 4
 BRICK_LEVELS = 7
-BRICK_ENTRIES = VALUES + PLACES * BRICK_LEVELS
+BRICK_ENTRIES = BRICK_VALUES + BRICK_PLACES * BRICK_LEVELS
 HIGH_STEPS = 65536.0
 
 ThreeWeights = tuple[float, float, float]
@@ -109,15 +109,15 @@ class FieldArguments(NamedTuple):
 
 def largest_coefficient(field: FieldArguments) -> float:
     """Return the greatest coefficient [m], or 0."""
-    heads = field.bricks[:, :VALUES].astype(float)
-    origins = HIGH_STEPS * heads[:, HIGH] + heads[:, LOW]
-    values = heads[:, STEP] * (origins + field.bricks[:, VALUES:].max(axis=1))
+    heads = field.bricks[:, :BRICK_VALUES].astype(float)
+    origins = HIGH_STEPS * heads[:, ORIGIN_HIGH] + heads[:, ORIGIN_LOW]
+    values = heads[:, BRICK_STEP] * (origins + field.bricks[:, BRICK_VALUES:].max(axis=1))
     return float(max(field.c.max(initial=0.0), field.unit * values.max(initial=0.0)))
 
 
 def largest_step(field: FieldArguments) -> float:
     """Return the greatest step of bricks [m], 0 without them."""
-    return field.unit * float(field.bricks[:, STEP].max(initial=0))
+    return field.unit * float(field.bricks[:, BRICK_STEP].max(initial=0))
 
 
 def field_halvings(field: FieldArguments) -> int:
@@ -158,8 +158,10 @@ def brick_at(i: int, j: int, k: int, field: FieldArguments) -> int:
 
 def brick_scale(brick: int, field: FieldArguments) -> tuple[float, float]:
     """Return the origin of the coefficients of a brick [m], and their step [m]."""
-    step = field.unit * float(field.bricks[brick, STEP])
-    origin = HIGH_STEPS * float(field.bricks[brick, HIGH]) + float(field.bricks[brick, LOW])
+    step = field.unit * float(field.bricks[brick, BRICK_STEP])
+    origin = HIGH_STEPS * float(field.bricks[brick, ORIGIN_HIGH]) + float(
+        field.bricks[brick, ORIGIN_LOW]
+    )
     return origin * step, step
 
 
@@ -168,7 +170,7 @@ def brick_coefficient(i: int, j: int, level: int, field: FieldArguments) -> floa
     k = level // BRICK_LEVELS
     brick = brick_at(i >> 1, j >> 1, k, field)
     origin, step = brick_scale(brick, field)
-    place = VALUES + PLACES * (level - BRICK_LEVELS * k) + 2 * (j & 1) + (i & 1)
+    place = BRICK_VALUES + BRICK_PLACES * (level - BRICK_LEVELS * k) + 2 * (j & 1) + (i & 1)
     return origin + step * float(field.bricks[brick, place])
 
 
@@ -231,24 +233,24 @@ def sum_brick(
     lanes: FloatArray,
     field: FieldArguments,
 ) -> None:
-    """Write the sums along z of 2 x 2 columns from a level of a brick on, (2, PLACES)."""
+    """Write the sums along z of 2 x 2 columns from a level of a brick on, (2, BRICK_PLACES)."""
     n0 = n1 = n2 = brick_at(i, j, k, field)
     o0, s0 = brick_scale(n0, field)
     o1 = o2 = o0
     s1 = s2 = s0
-    p0 = VALUES + PLACES * level
-    p1 = p0 + PLACES
-    p2 = p1 + PLACES
+    p0 = BRICK_VALUES + BRICK_PLACES * level
+    p1 = p0 + BRICK_PLACES
+    p2 = p1 + BRICK_PLACES
     if level > BRICK_LEVELS - 3:  # the last level is in the next brick
         n2 = brick_at(i, j, k + 1, field)
         o2, s2 = brick_scale(n2, field)
-        p2 -= PLACES * BRICK_LEVELS
+        p2 -= BRICK_PLACES * BRICK_LEVELS
     if level > BRICK_LEVELS - 2:
         n1 = n2
         o1 = o2
         s1 = s2
-        p1 -= PLACES * BRICK_LEVELS
-    for lane in range(PLACES):
+        p1 -= BRICK_PLACES * BRICK_LEVELS
+    for lane in range(BRICK_PLACES):
         c0 = o0 + s0 * float(field.bricks[n0, p0 + lane])
         c1 = o1 + s1 * float(field.bricks[n1, p1 + lane])
         c2 = o2 + s2 * float(field.bricks[n2, p2 + lane])

@@ -19,7 +19,7 @@ from asperity.core.files import content_digest, set_values, to_plain_data
 from asperity.measured.lengths import format_length
 from asperity.textures.fields.field_bricks import align_bricks
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.field_record import VALUES, ZERO, FieldArguments
+from asperity.textures.fields.field_record import BRICK_VALUES, ZERO, FieldArguments
 from asperity.textures.texture import CertifiedNumber, Texture
 
 
@@ -208,7 +208,7 @@ class PotentialField(Texture, Tabular):
     @property
     def nodes(self) -> int:
         """Number of stored coefficients; those of bricks include some beyond the columns."""
-        return self.arguments.c.size + self.arguments.bricks[1:, VALUES:].size
+        return self.arguments.c.size + self.arguments.bricks[1:, BRICK_VALUES:].size
 
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
