@@ -162,7 +162,7 @@ def test_rounding_changes_the_force_by_little(monkeypatch: pytest.MonkeyPatch) -
     accuracy = rounded.texture.accuracy
     assert accuracy.share == pytest.approx(exact.texture.accuracy.share, rel=1e-3)
     assert accuracy.bound > exact.texture.accuracy.bound
-    assert (len(exact.texture.arguments.bricks), BRICK_BYTES) == (0, 2**22)
+    assert (len(exact.texture.arguments.bricks), BRICK_BYTES) == (0, 2**24)
 
 
 def test_file_holds_the_bricks(large: Any, tmp_path: Path) -> None:

@@ -21,11 +21,11 @@ from asperity.textures.fields.field_record import (
     FieldArguments,
 )
 
-BRICK_BYTES = 2**22
+BRICK_BYTES = 2**24
 """Size of coefficients in single precision [bytes] above which a field is stored in bricks.
 
-Less stays in the cache of a core under a stroke, where decoding costs more than it saves: a tick
-was measured to leave it between 2.6 and 5.8 MB.
+Less stays in the last cache of most processors, where decoding costs more than it saves
+(``python -m bench bricks``).
 """
 # Steps from the least to the greatest coefficient of a brick, and powers of two between the steps
 # of bricks, which 16 bits hold; bits of single precision; exponent of no step.
