@@ -11,6 +11,7 @@ from tests.helpers.c_programs import as_exported, header, kernel_ticks, library,
 
 import asperity as asp
 from asperity.analysis import characteristic_number, one_sided_number, worst_loop
+from asperity.analysis.energy.press import holds_at_any_press
 from asperity.analysis.energy.straight_scan import friction_scan
 from asperity.analysis.passivity import criteria
 from asperity.analysis.passivity.verdict import passivity
@@ -51,6 +52,11 @@ def test_friction_acts_along_a_vertical_side(body: Surface, axis: int) -> None:
 def test_pressing_alone_feels_no_friction(body: Surface) -> None:
     path = line([HALF + DEPTH, 0.0, -2e-3], [HALF - 2 * DEPTH, 0.0, -2e-3])
     np.testing.assert_allclose(body.trace(path), body.without_friction().force(path), atol=1e-12)
+
+
+def test_a_body_holds_down_to_its_depth_alone(body: Surface) -> None:
+    """Its field ends within it, that of a surface does not."""
+    assert not holds_at_any_press(body)
 
 
 def test_deflection_has_three_coordinates(body: Surface) -> None:
