@@ -91,3 +91,17 @@ def test_numba_dependency_has_an_upper_bound() -> None:
     (bound,) = [r for r in project["project"]["dependencies"] if r.startswith("numba")]
     major, minor = map(int, numba.__version__.split(".")[:2])
     assert re.fullmatch(rf"numba>=[0-9.]+,<{major}\.{minor + 1}", bound)
+
+
+def test_code_that_is_linked_in_another_way_has_another_key(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A version before read entries of the next one, and ended with a segmentation fault."""
+
+    def function() -> None: ...
+
+    entry = numba_internals.MachineCodeCache(function, is_called=True)
+    target = numba_internals.code_target()
+    key = entry._key((), target, "cpython")
+    monkeypatch.setattr(numba_internals, "_LINKING", 1)
+    assert entry._key((), target, "cpython") != key

@@ -234,6 +234,11 @@ _serialize: Any = serialize.dumps
 _config: Any = numba.config
 
 
+# How code is linked that entries hold. A version of the package that links in another way would
+# end with a segmentation fault: raise the number where the libraries or lowerings above change.
+_LINKING = 2
+
+
 class MachineCodeCache:
     """Cache of the compiled overloads of one function, as Numba's dispatcher uses it.
 
@@ -274,7 +279,7 @@ class MachineCodeCache:
         content = packed.get_entry(self._packed_key(sig, packed))
         if content is None:
             return None
-        with suppress(Exception):  # see _load_cached
+        with suppress(Exception):  # of another build of Numba: it is compiled, with a warning
             return self._rebuild(content, target_context)
         return None
 
@@ -328,7 +333,7 @@ class MachineCodeCache:
 
     def _key(self, sig: Any, target: CodeTarget, interpreter: str) -> str:
         """Return what the machine code depends on: source, types, processor and versions."""
-        versions = (interpreter, target.numba, target.llvmlite, sys.byteorder)
+        versions = (interpreter, target.numba, target.llvmlite, sys.byteorder, _LINKING)
         types = (str(sig), *map(_record_fields, sig))
         function = (self._function.__module__, self._function.__name__, types)
         return repr((*function, tuple(target[2:]), *versions))

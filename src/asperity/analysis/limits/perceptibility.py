@@ -235,11 +235,10 @@ def _lower_tier(waves: WaveScan, response: HandSpectrum) -> Tier:
     """Return the tier of a texture that is not felt for certain."""
     case = replace(waves.case, time_samples=MIN_SAMPLES, position_samples=MIN_SAMPLES)
     sampled = _is_sampled(case, waves.reach)
-    amplitude = float(np.linalg.norm(case.forces[sampled]))
     noticed = response.motions / response.unnoticed
     if np.linalg.norm(noticed[sampled]) < 1.0:
         return "not felt"
-    if amplitude < case.device.get("force_resolution", 0.0):
+    if np.linalg.norm(case.forces[sampled]) < case.device.get("force_resolution", 0.0):
         return "not felt"
     is_certain = np.linalg.norm(noticed[sampled & response.is_known]) >= 1.0
     return "borderline" if is_certain else "unknown"
