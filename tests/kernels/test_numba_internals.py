@@ -97,9 +97,7 @@ def test_code_that_is_linked_in_another_way_has_another_key(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A version before read entries of the next one, and ended with a segmentation fault."""
-
-    def function() -> None: ...
-
+    function: Any = test_code_that_is_linked_in_another_way_has_another_key
     entry = numba_internals.MachineCodeCache(function, is_called=True)
     target = numba_internals.code_target()
     key = entry._key((), target, "cpython")
