@@ -140,7 +140,7 @@ def search_exhaustively(case: Case, points: FloatArray) -> FloatArray:
     return best
 
 
-@njit
+@njit  # type: ignore[untyped-decorator]  # of Numba
 def lowest_minima(points: Any, reach: Any, grid: Any, step: float, indices: Any) -> None:
     """Write the samples (column, row) at the lowest local minima of the distance.
 

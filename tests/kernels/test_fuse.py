@@ -78,7 +78,7 @@ def test_incompatible_cache_entry_is_recompiled(monkeypatch: pytest.MonkeyPatch)
     def raise_type_error(*_arguments: object) -> None:
         raise TypeError("of another build")
 
-    monkeypatch.setattr(code_store._CompileResult, "_rebuild", raise_type_error)
+    monkeypatch.setattr(code_store.compiler.CompileResult, "_rebuild", raise_type_error)
     with pytest.warns(checked.CacheWarning):
         assert fuse.load_fused(LOOP).twice(3.0) == 6.0
 

@@ -11,12 +11,13 @@ import inspect
 import re
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
 import pytest
 from numba import _dynfunc
-from numba.core import codegen, compiler, dispatcher, typed_passes
+from numba.core import codegen, compiler, dispatcher, targetconfig, typed_passes, types
 
 from asperity.kernels import numba_internals
 
@@ -39,6 +40,12 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
     "function": (_dynfunc, "make_function", None, "LinkOnlyLowering"),
     "rebuild": (compiler.CompileResult, "_rebuild", None, "MachineCodeCache._load_cached"),
     "reduce": (compiler.CompileResult, "_reduce", ("self",), "MachineCodeCache.save_overload"),
+    "resolve": (
+        types.BaseFunction,
+        "get_call_type",
+        ("function", "context", "args", "kws"),
+        "remember_signatures",
+    ),
     "magic": (codegen.CPUCodegen, "magic_tuple", ("self",), "MachineCodeCache._key"),
 }
 
@@ -91,6 +98,26 @@ def test_numba_dependency_has_an_upper_bound() -> None:
     (bound,) = [r for r in project["project"]["dependencies"] if r.startswith("numba")]
     major, minor = map(int, numba.__version__.split(".")[:2])
     assert re.fullmatch(rf"numba>=[0-9.]+,<{major}\.{minor + 1}", bound)
+
+
+def test_equal_calls_are_resolved_once_for_the_options_of_the_caller() -> None:
+    tried: list[Any] = []
+
+    def resolve(function: Any, _context: Any, args: Any, _kws: Any) -> Any:
+        tried.append(args)
+        function._impl_keys[args] = len(tried)
+        return SimpleNamespace(args=args)
+
+    resolve_once = numba_internals.remember_signatures(resolve)
+    function, flags = SimpleNamespace(_impl_keys={}), compiler.Flags()
+    with targetconfig.ConfigStack().enter(flags):
+        for args in (("float",), ("float",), ("int",), ("float",)):
+            function._impl_keys.clear()
+            assert resolve_once(function, None, args, {}).args == args
+        assert (tried, function._impl_keys) == ([("float",), ("int",)], {("float",): 1})
+        flags.error_model = "numpy"
+        resolve_once(function, None, args, {})
+    assert len(tried) == 3
 
 
 def test_code_that_is_linked_in_another_way_has_another_key(

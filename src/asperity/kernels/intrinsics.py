@@ -20,9 +20,6 @@ from numba.np import arrayobj
 from numpy.typing import NDArray
 
 _WORD_BYTES = 8
-# Numba is untyped.
-_StarArgTuple: Any = types.StarArgTuple
-_intrinsic: Any = intrinsic
 
 
 def _call_address(_typing: Any, address: Any, *arguments: Any) -> Any:
@@ -43,7 +40,7 @@ def _call_address(_typing: Any, address: Any, *arguments: Any) -> Any:
         answer = builder.call(builder.inttoptr(word, pointer), passed)
         return builder.sext(answer, ir.IntType(64))
 
-    return types.int64(address, _StarArgTuple.from_types(passed_types)), generate
+    return types.int64(address, types.StarArgTuple.from_types(passed_types)), generate
 
 
 def _c_argument(context: Any, builder: Any, numba_type: Any, value: Any) -> Any:
@@ -99,23 +96,23 @@ def _store_release(_typing: Any, array: Any, index: Any, value: Any) -> Any:
     return types.void(array, types.intp, types.int64), generate
 
 
-call_address: Callable[..., int] = _intrinsic(_call_address)
+call_address: Callable[..., int] = intrinsic(_call_address)
 """Call the C function at an address, the first argument; return its ``int``.
 
 Numbers of 64 bits go as ``double`` or ``int64_t``, and arrays as the address of their first number.
 An integer of any narrower type is read from the same register on x86-64 and on arm64; so is a
 handle or a pointer.
 """
-load_acquire: Callable[[NDArray[np.int64], int], int] = _intrinsic(_load_acquire)
+load_acquire: Callable[[NDArray[np.int64], int], int] = intrinsic(_load_acquire)
 """Return an element of an int64 array; later reads see values at least as new."""
-store_release: Callable[[NDArray[np.int64], int, int], None] = _intrinsic(_store_release)
+store_release: Callable[[NDArray[np.int64], int, int], None] = intrinsic(_store_release)
 """Write an element of an int64 array; whoever reads it sees all earlier writes."""
 
 
 _DOUBLE = ir.DoubleType()
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]  # of Numba
 def multiply_add(_typing: Any, a: Any, b: Any, c: Any) -> Any:
     """Return a b + c, rounded once where the processor has an instruction for it, else twice.
 
@@ -132,7 +129,7 @@ def multiply_add(_typing: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(a, b, c), generate
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]  # of Numba
 def load_unchecked(_typing: Any, array: Any, index: Any) -> Any:
     """Return an element of an array by its position in memory, without a bounds check."""
 
@@ -142,12 +139,7 @@ def load_unchecked(_typing: Any, array: Any, index: Any) -> Any:
     return types.float64(array, index), generate
 
 
-# Numba is untyped.
-_cgutils: Any = cgutils
-_arrayobj: Any = arrayobj
-
-
-@intrinsic(prefer_literal=True)
+@intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]  # of Numba
 def local_array(_typing: Any, shape: Any) -> Any:
     """Return an uninitialised float64 array of a constant shape, such as ``local_array((5, 4))``.
 
@@ -161,10 +153,10 @@ def local_array(_typing: Any, shape: Any) -> Any:
     def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
         layout = np.empty(lengths)
         number = context.get_value_type(types.float64)
-        memory = _cgutils.alloca_once(builder, number, size=layout.size)
-        array = _arrayobj.make_array(array_type)(context, builder)
+        memory = cgutils.alloca_once(builder, number, size=layout.size)
+        array = arrayobj.make_array(array_type)(context, builder)
         word = context.get_value_type(types.intp)
-        _arrayobj.populate_array(
+        arrayobj.populate_array(
             array,
             data=memory,
             shape=[word(length) for length in lengths],

@@ -1,11 +1,12 @@
-"""Everything that uses private parts of Numba: three compilers, and a cache of machine code.
+"""Everything that uses private parts of Numba: three compilers, and caches of types and code.
 
 Private names: ``JITCodeLibrary`` with its methods ``_optimize_final_module``,
 ``_finalize_final_module``, ``_finalize_dynamic_globals``, ``_verify_declare_only_symbols`` and
 ``_get_module_for_linking`` and its ``_linking_libraries`` and ``_shared_module``,
 ``CPUCodegen._create_empty_module`` and ``_engine``, ``JitEngine._defined_symbols``,
 ``_dynfunc.make_function``, ``Dispatcher._cache`` and ``_compiler``, ``CompileResult._rebuild`` and
-``_reduce``, ``registry.cpu_target``. The dependency on Numba has an upper bound for their sake, and
+``_reduce``, ``registry.cpu_target``, ``BaseFunction.get_call_type`` and its ``_impl_keys``,
+``Flags._values``. The dependency on Numba has an upper bound for their sake, and
 ``tests/kernels/test_numba_internals.py`` says which of them a new version changes.
 
 Compilers. Numba optimises each function and generates machine code for it with everything that it
@@ -33,7 +34,7 @@ from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]  # it has no types
 import numba
-from numba import _dynfunc  # type: ignore[attr-defined]  # of compiled code
+from numba import _dynfunc
 from numba.core import (
     codegen,
     compiler,
@@ -41,7 +42,9 @@ from numba.core import (
     dispatcher,
     registry,
     serialize,
+    targetconfig,
     typed_passes,
+    types,
 )
 
 from asperity.core import cache
@@ -55,16 +58,8 @@ from asperity.core.packed_code import (
 )
 from asperity.core.processes import defer_interrupt
 
-# Numba is untyped.
-_Library: Any = codegen.JITCodeLibrary
-_Lowering: Any = typed_passes.NativeLowering
-_Compiler: Any = compiler.Compiler
-_compiler: Any = compiler
-_Dispatcher: Any = dispatcher.Dispatcher
-_register: Any = compiler_machinery.register_pass
 
-
-class LinkOnlyLibrary(_Library):  # type: ignore[misc]  # see above
+class LinkOnlyLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]  # Numba is untyped
     """Code that is only linked into other code."""
 
     def _optimize_final_module(self) -> None:
@@ -76,8 +71,8 @@ class LinkOnlyLibrary(_Library):  # type: ignore[misc]  # see above
         self._finalized = True
 
 
-@_register(mutates_CFG=True, analysis_only=False)
-class LinkOnlyLowering(_Lowering):  # type: ignore[misc]  # see above
+@compiler_machinery.register_pass(mutates_CFG=True, analysis_only=False)
+class LinkOnlyLowering(typed_passes.NativeLowering):  # type: ignore[misc]  # see above
     """Numba's lowering from typed code to LLVM code, without machine code."""
 
     _name = "link_only_lowering"
@@ -98,7 +93,7 @@ class LinkOnlyLowering(_Lowering):  # type: ignore[misc]  # see above
         return changed
 
 
-class WideVectorLibrary(_Library):  # type: ignore[misc]  # see above
+class WideVectorLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]  # see above
     """Code in the widest vector registers of the processor, which callers call by its symbol.
 
     Other code is copied into its callers. For many processors LLVM uses half of an AVX-512
@@ -122,8 +117,8 @@ class WideVectorLibrary(_Library):  # type: ignore[misc]  # see above
         super()._finalize_final_module()
 
 
-@_register(mutates_CFG=True, analysis_only=False)
-class WideVectorLowering(_Lowering):  # type: ignore[misc]  # see above
+@compiler_machinery.register_pass(mutates_CFG=True, analysis_only=False)
+class WideVectorLowering(typed_passes.NativeLowering):  # type: ignore[misc]  # see above
     """Numba's lowering from typed code to machine code, in wide registers."""
 
     _name = "wide_lowering"
@@ -136,7 +131,7 @@ class WideVectorLowering(_Lowering):  # type: ignore[misc]  # see above
         return changed
 
 
-@_register(mutates_CFG=True, analysis_only=False)
+@compiler_machinery.register_pass(mutates_CFG=True, analysis_only=False)
 class SharedLowering(WideVectorLowering):
     """The same, with a symbol that is equal in all processes."""
 
@@ -150,7 +145,7 @@ class SharedLowering(WideVectorLowering):
         return super().run_pass(state)
 
 
-class _CustomLoweringCompiler(_Compiler):  # type: ignore[misc]  # see above
+class _CustomLoweringCompiler(compiler.Compiler):  # type: ignore[misc]  # see above
     """Numba's compiler with a different lowering."""
 
     lowering: Any
@@ -184,6 +179,31 @@ class SharedCompiler(_CustomLoweringCompiler):
     lowering = SharedLowering
 
 
+def remember_signatures(resolve: Callable[..., Any]) -> Callable[..., Any]:
+    """Return Numba's ``get_call_type`` such that it resolves equal calls once.
+
+    Numba tries all implementations of an operator or function wherever it is used, which took a
+    fifth of the time of compilation. What it finds depends on the types and on the options of the
+    caller; a function to which somebody adds an implementation is another object.
+    """
+
+    def get_call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
+        known = vars(function).setdefault("_resolved_calls", {})
+        call = (context, tuple(args), tuple(dict(kws).items()))
+        options = dict(getattr(targetconfig.ConfigStack.top_or_none(), "_values", {}))
+        signature, implementation, used_options = known.get(call, (None, None, None))
+        if signature is None or options != used_options:
+            signature = resolve(function, context, args, kws)
+            implementation = function._impl_keys[signature.args]
+            known[call] = (signature, implementation, options)
+        function._impl_keys[signature.args] = implementation
+        return signature
+
+    return get_call_type
+
+
+types.BaseFunction.get_call_type = remember_signatures(types.BaseFunction.get_call_type)
+
 _FUNCTION_IDS: dict[tuple[object, ...], int] = {}
 _CANONICAL_FUNCTIONS: dict[int, Any] = {}
 
@@ -203,7 +223,10 @@ def share_identical_functions(module: ModuleType) -> None:
 
 
 def _is_link_only(value: object) -> bool:
-    return isinstance(value, _Dispatcher) and value._compiler.pipeline_class is LinkOnlyCompiler
+    return (
+        isinstance(value, dispatcher.Dispatcher)
+        and value._compiler.pipeline_class is LinkOnlyCompiler
+    )
 
 
 def _function_id(dispatcher: Any, known_ids: dict[FunctionType, int]) -> int:
@@ -226,12 +249,6 @@ def _global_key(value: object, known_ids: dict[FunctionType, int]) -> object:
     if _is_link_only(value):
         return "function", _function_id(value, known_ids)
     return repr(value) if isinstance(value, (int, float)) else id(value)
-
-
-# Numba is untyped.
-_CompileResult: Any = compiler.CompileResult
-_serialize: Any = serialize.dumps
-_config: Any = numba.config
 
 
 # How code is linked that entries hold. A version of the package that links in another way would
@@ -299,13 +316,13 @@ class MachineCodeCache:
 
     def _rebuild(self, content: bytes, target_context: Any) -> Any:
         *parts, callees = pickle.loads(content)
-        for module, name, types in callees:
-            getattr(sys.modules[module], name).compile(types)
+        for module, name, argument_types in callees:
+            getattr(sys.modules[module], name).compile(argument_types)
         # Numba looks for this name in the code that callers copy: there is none.
         if self._is_called:
             engine = target_context.codegen()._engine
             engine._defined_symbols.add(parts[1].llvm_cpython_wrapper_name)
-        return self._mark(_CompileResult._rebuild(target_context, *parts))
+        return self._mark(compiler.CompileResult._rebuild(target_context, *parts))
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Store a compiled overload."""
@@ -316,7 +333,7 @@ class MachineCodeCache:
         own = tuple([env for env in environments if env.globals["__name__"] == module])
         key = self._key(sig, code_target(data.codegen), _interpreter())
         content = (*parts, own, _shared_callees(data.library))
-        cache.put_entry(CODE_NAMESPACE, key, _serialize(content))
+        cache.put_entry(CODE_NAMESPACE, key, serialize.dumps(content))
         cache.unlock(CODE_NAMESPACE, key)
         self._report("")
 
@@ -347,9 +364,7 @@ def code_target(codegen: Any = None) -> CodeTarget:
 
 def _interpreter() -> str:
     """Return the interpreter for which code is compiled: for a named processor, of any build."""
-    if _config.CPU_NAME is None:
-        return sys.version
-    return INTERPRETER
+    return sys.version if numba.config.CPU_NAME is None else INTERPRETER
 
 
 def _shared_callees(library: Any) -> tuple[Any, ...]:
@@ -386,7 +401,7 @@ def cache_machine_code(decorator: Callable[..., Any]) -> Callable[..., Any]:
 
         def compile_whole(signature: Any) -> Any:
             # No options of the caller are inherited: they are part of the symbol.
-            with defer_interrupt(), _compiler.ConfigStack().enter(_compiler.Flags()):
+            with defer_interrupt(), compiler.ConfigStack().enter(compiler.Flags()):
                 return compile_overload(signature)
 
         dispatcher.compile = compile_whole

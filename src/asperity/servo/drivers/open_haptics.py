@@ -250,11 +250,11 @@ class OpenHapticsDriver(ThreadedDriver):
 @cache
 def _callback() -> Any:
     """Return the compiled callback of the scheduler: no interpreter runs in its thread."""
-    from numba import carray, cfunc, types  # type: ignore[attr-defined]  # it has no stubs
+    from numba import carray, cfunc, types
 
     frame = fuse_module(sys.modules[__name__], threaded, clock_module()).haptic_frame
 
-    @cfunc(types.uint32(types.voidptr))
+    @cfunc(types.uint32(types.voidptr))  # type: ignore[untyped-decorator]  # of Numba
     def callback(memory: Any) -> Any:
         words = carray(memory, (BUFFER_WORDS,), np.int64)
         return frame(words, carray(memory, (BUFFER_WORDS,), np.float64))
