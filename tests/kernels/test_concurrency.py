@@ -57,9 +57,16 @@ def compute_concurrently(how: str, count: int, folder: Path) -> list[list[str]]:
     return results
 
 
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> list[list[str]]:
+    """Return the result of one thread, with a cache of its own."""
+    return compute_concurrently("threads", 1, tmp_path_factory.mktemp("alone"))
+
+
 @pytest.mark.parametrize(("how", "count"), [("threads", 8), ("fork", 3), ("spawn", 3)])
-def test_concurrent_workers_get_bitwise_equal_results(how: str, count: int, tmp_path: Path) -> None:
-    expected = compute_concurrently("threads", 1, tmp_path)
+def test_concurrent_workers_get_bitwise_equal_results(
+    how: str, count: int, expected: list[list[str]], tmp_path: Path
+) -> None:
     results = compute_concurrently(how, count, tmp_path)
     assert results == expected * count
     entries = {path.name for path in (tmp_path / f"cache-{how}").rglob("*") if path.is_file()}

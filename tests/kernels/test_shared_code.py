@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -152,22 +152,44 @@ def test_link_only_function_has_no_machine_code() -> None:
     assert compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) == 0
 
 
+# Imports and the start of the compiler take most of the time of a process: those that compile are
+# forked after them.
 PROGRAM = """
-import sys
+import os, sys
+import numba
 from tests.kernels.test_shared_code import DEEP, MINUS, TIMES, load
 loops = {"times": TIMES, "minus": MINUS, "deep": DEEP}
-print(*(getattr(load(loops[name]), name)(2.0) for name in sys.argv[1:]))
+numba.njit(lambda x: x)(1.0)
+for line in sys.stdin:
+    if os.fork() == 0:
+        print(*(getattr(load(loops[name]), name)(2.0) for name in line.split()), flush=True)
+        os._exit(0)
+    if os.wait()[1]:
+        print("failed", flush=True)
 """
 
 
-def run_in_new_process(*names: str) -> list[float]:
-    command = [sys.executable, "-c", PROGRAM, *names]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return [float(word) for word in done.stdout.split()]
+@pytest.fixture
+def run_in_new_process() -> Iterator[Callable[..., list[float]]]:
+    """Return a function that runs loops, given by name, in a process that has no code yet."""
+    command = [sys.executable, "-c", PROGRAM]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, bufsize=1) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        lines = process.stdout
+
+        def run(*names: str) -> list[float]:
+            print(*names, file=process.stdin)
+            return [float(word) for word in lines.readline().split()]
+
+        yield run
 
 
 @pytest.mark.usefixtures("empty_cache")
-def test_cached_code_finds_the_shared_functions_that_it_calls(tmp_path: Path) -> None:
+def test_cached_code_finds_the_shared_functions_that_it_calls(
+    run_in_new_process: Callable[..., list[float]], tmp_path: Path
+) -> None:
     """Whatever of a program is cached, and in whatever order the rest is compiled."""
     assert run_in_new_process("times") == [742.0]
     assert run_in_new_process("minus", "times") == [-106.0, 742.0]
