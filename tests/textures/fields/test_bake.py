@@ -114,15 +114,19 @@ def test_smoothing_is_widened_where_it_no_longer_lowers_the_gain(
     assert narrow.gain.upper > 1.2
 
 
-@pytest.mark.parametrize(("power", "trials"), [(1.25, 2), (1.8, 3), (2.6, 3)])
+@pytest.mark.parametrize(
+    ("power", "factor", "rest", "trials"),
+    [(1.25, 5.0, 0.0, 2), (1.8, 5.0, 0.0, 3), (2.6, 5.0, 0.0, 3), (1.0, 4.0, 0.4, 4)],
+)
 def test_search_ends_after_few_trials_where_errors_follow_a_power(
-    power: float, trials: int, monkeypatch: pytest.MonkeyPatch
+    power: float, factor: float, rest: float, trials: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Also where the growth of cells leaves an error at every resolution."""
     plan, tried = BakePlan(WAVE, 4e-4, 1.0, BakeGoal()), list[float]()
 
     def bake(resolution: float, _progress: object) -> SimpleNamespace:
         tried.append(resolution)
-        share = 5.0 * plan.goal.share * (resolution / 1e-5) ** power
+        share = plan.goal.share * (rest + factor * (resolution / 1e-5) ** power)
         return SimpleNamespace(accuracy=SimpleNamespace(share=share, onset=0.0))
 
     monkeypatch.setattr(plan, "bake", bake)
@@ -130,22 +134,6 @@ def test_search_ends_after_few_trials_where_errors_follow_a_power(
     field = plan.bake_coarsest(None)
     assert len(tried) <= trials
     assert 0.5 * plan.goal.share <= field.accuracy.share <= plan.goal.share
-
-
-def test_search_ends_though_growth_of_cells_leaves_an_error(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    plan, tried = BakePlan(WAVE, 4e-4, 1.0, BakeGoal()), list[float]()
-
-    def bake(resolution: float, _progress: object) -> SimpleNamespace:
-        tried.append(resolution)
-        share = plan.goal.share * (0.4 + 4.0 * resolution / 1e-5)
-        return SimpleNamespace(accuracy=SimpleNamespace(share=share, onset=0.0))
-
-    monkeypatch.setattr(plan, "bake", bake)
-    monkeypatch.setattr(plan, "finest_resolution", lambda size=None: 1e-5 if size else 1e-7)
-    assert plan.bake_coarsest(None).accuracy.share <= plan.goal.share
-    assert len(tried) <= 4
 
 
 @pytest.mark.parametrize("texture", [WAVE, Profile(8e-5 * _ROUGH[0], 1e-4)])
