@@ -1,0 +1,1 @@
+"""Tests of the page, with one lab, which ends with the last of them."""
