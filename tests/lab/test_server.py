@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import time
 from contextlib import suppress
 from http.client import HTTPConnection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say, taken
 from tests.lab.started import Started
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 import asperity as asp
+from asperity.cli.main import cli
 from asperity.lab.access import MAX_MESSAGE_BYTES, page_files
-from asperity.lab.scene_state import DEFAULT_SURFACE, START_LAW, START_STIFFNESS
+from asperity.lab.scene_state import DEFAULT_SURFACE, START_LAW, START_STIFFNESS, SceneState
 from asperity.lab.server import MAX_PENDING_FRAMES, MIN_FRAME_INTERVAL
 
 
@@ -217,8 +221,8 @@ def test_pictures_come_again_when_their_process_was_killed(lab: Started) -> None
 
 def test_the_next_port_is_named(lab: Started) -> None:
     port = lab.host.split(":")[1]
-    with pytest.raises(AssertionError, match=rf"port {port} is not available; \d+ is free"):
-        Started("--port", port)
+    result = CliRunner().invoke(cli, ["lab", "--port", port])
+    assert re.search(rf"port {port} is not available; \d+ is free", str(result.exception))
 
 
 UNKNOWN = 'id = "unknown"\napparent_mass = "60 g"\n'
@@ -227,29 +231,48 @@ UNKNOWN = 'id = "unknown"\napparent_mass = "60 g"\n'
 def test_a_lab_starts_with_what_compare_recommends() -> None:
     row = asp.compare(DEFAULT_SURFACE, "omega.3").recommended_row
     assert row is not None
-    assert started_settings() == ("omega.3", row.law.letter, row.recommended_stiffness)
-
-
-def test_a_lab_starts_with_the_stiffness_that_holds_with_its_clamp() -> None:
-    row, free = (
-        asp.compare(DEFAULT_SURFACE, "omega.3", "G", clamp=clamp).rows[0]
-        for clamp in ("backed", "none")
-    )
-    assert row.recommended_stiffness < 0.99 * free.recommended_stiffness
-    assert started_settings("--law", "G") == ("omega.3", "G", row.recommended_stiffness)
-
-
-def test_a_lab_starts_where_nothing_is_recommended(tmp_path: Path) -> None:
-    device = tmp_path / "unknown.toml"
-    device.write_text(UNKNOWN)
-    assert started_settings("--device", str(device)) == ("unknown", START_LAW, START_STIFFNESS)
-
-
-def started_settings(*arguments: str) -> tuple[str, str, float]:
-    lab = Started("--port", "0", *arguments)
+    lab = Started("--port", "0")
     try:
         with joined(lab) as page:
             settings = heard(page, news(state="running"))["settings"]
     finally:
         lab.close()
+    assert initial(settings) == ("omega.3", row.law.letter, row.recommended_stiffness)
+
+
+def test_a_lab_starts_with_the_stiffness_that_holds_with_its_clamp(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    row, free = (
+        asp.compare(DEFAULT_SURFACE, "omega.3", "G", clamp=clamp).rows[0]
+        for clamp in ("backed", "none")
+    )
+    assert row.recommended_stiffness < 0.99 * free.recommended_stiffness
+    settings = served_settings(monkeypatch, "--law", "G")
+    assert initial(settings) == ("omega.3", "G", row.recommended_stiffness)
+
+
+def test_a_lab_starts_where_nothing_is_recommended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device = tmp_path / "unknown.toml"
+    device.write_text(UNKNOWN)
+    settings = served_settings(monkeypatch, "--device", str(device))
+    assert initial(settings) == ("unknown", START_LAW, START_STIFFNESS)
+
+
+def initial(settings: dict[str, Any]) -> tuple[str, str, float]:
     return settings["device"], settings["law"], settings["stiffness"]
+
+
+def served_settings(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> dict[str, Any]:
+    """Return the settings of the scene that the command serves, without serving it."""
+    scenes: list[SceneState] = []
+
+    async def keep_scene(scene: SceneState, place: socket.socket, *_others: object) -> None:
+        place.close()
+        scenes.append(scene)
+
+    monkeypatch.setattr("asperity.lab.server.serve_lab", keep_scene)
+    CliRunner().invoke(cli, ["lab", "--port", "0", *arguments], catch_exceptions=False)
+    return scenes[0].settings

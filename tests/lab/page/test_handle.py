@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from bench.stand_ins.fakes import compile_library
+from click.testing import CliRunner
 from tests.lab.browser import Browser, needs_browser, until
 from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say
 from tests.lab.started import Started
 
+from asperity.cli.main import cli
+from asperity.core.errors import AsperityError
 from asperity.lab.scene_state import make_device_scene_state
 from asperity.lab.server import STEERING_TIMEOUT
 from asperity.lab.session import Session, make_handle
@@ -379,17 +382,26 @@ def test_a_lab_that_is_ended_lets_the_force_go(
     assert not other.open
 
 
-def test_what_cannot_be_rendered_is_said_before_the_page(folder: Path) -> None:
-    driver = str(folder / LIBRARY)
-    cases = {
-        "is above the limit": ("--stiffness", "2kN/m", "--driver", driver),
-        "driver is unknown": ("--driver", "velvet"),
-        "max_force is not known": ("--device", "pantograph", "--driver", driver, "--accept-risk"),
-        "none.mcap": ("--driver", "replay:none.mcap"),
-    }
-    for words, more in cases.items():
-        with pytest.raises(AssertionError, match=words):
-            Started(str(folder / "scene.toml"), *more).close()
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--stiffness", "2kN/m", "--driver", LIBRARY), "is above the limit"),
+        (("--driver", "velvet"), "driver is unknown"),
+        (
+            ("--device", "pantograph", "--driver", LIBRARY, "--accept-risk"),
+            "max_force is not known",
+        ),
+        (("--driver", "replay:none.mcap"), "none.mcap"),
+    ],
+)
+def test_what_cannot_be_rendered_is_said_before_the_page(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...], words: str
+) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("asperity.lab.access.bind_socket", None)  # no page: nothing listens
+    result = CliRunner().invoke(cli, ["lab", "scene.toml", *more])
+    assert isinstance(result.exception, AsperityError)
+    assert words in str(result.exception)
 
 
 def test_a_recording_moves_the_handle_and_ends_with_its_rows(folder: Path) -> None:
