@@ -11,7 +11,15 @@ from tests.lab.browser import Browser
 
 import asperity as asp
 from asperity.measured.reading.measured_file import show
-from asperity.paper.cycle_experiments import DeviceExperiment, device_onset, passivity_experiment
+from asperity.paper.cycle_experiments import (
+    ADDED_PANELS,
+    FIGURE_5_PANELS,
+    DeviceExperiment,
+    PassivityExperiment,
+    count_cycles,
+    device_onset,
+    passivity_onsets,
+)
 from asperity.paper.experiments import Experiments, bump_experiment, scanning_experiment
 from asperity.report import html_text
 from asperity.report.document.html import render_page
@@ -31,8 +39,9 @@ PRESS = Path(__file__).parents[2] / "examples" / "press.toml"
 def experiments() -> Experiments:
     """Return all experiments of the paper in reduced size."""
     surface = Surface(Sinusoid(0.1e-3, 1e-3), "A", max_depth=1e-3)
+    counts = [count_cycles(*panel, starts=4) for panel in (*FIGURE_5_PANELS, *ADDED_PANELS)]
     return Experiments(
-        passivity_experiment("WH", (0,), starts=2),
+        PassivityExperiment(tuple(counts), passivity_onsets("WH", (0,), 2)),
         scanning_experiment("A"),
         bump_experiment("AD"),
         DeviceExperiment((device_onset("touch", "sinusoid", surface),), ("falcon",)),
@@ -55,7 +64,7 @@ def report_pages(
         "analysis": html_text(asp.analyze(sinusoid, device="touch", law="A")),
         "limits": html_text(asp.limits(sinusoid, device="touch", law="A")),
         "envelope": html_text(
-            asp.envelope(["touch", "inverse3"], "BCDH", wavelengths=[0.5e-3, 1e-3, 2e-3, 5e-3])
+            asp.envelope(["touch", "inverse3"], "BH", wavelengths=[0.5e-3, 1e-3, 5e-3])
         ),
         "measured": html_text(show(folder / "rough.npy", **options)),
         "run": render_page(run_page(setup, setup.simulate())),
