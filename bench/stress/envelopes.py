@@ -16,6 +16,7 @@ from tests.envelopes import test_find_design as designs
 
 def main() -> None:
     borders.COUNT = designs.COUNT = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    designs.POINTS = 1000
     for check in (
         borders.test_random_borders_are_those_of_comparisons,
         designs.test_feasible_targets_are_met_with_the_greatest_margin,

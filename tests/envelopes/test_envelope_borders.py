@@ -49,10 +49,11 @@ def compare_renders(case: WaveCase, wavelength: float, amplitude: float) -> bool
 def is_border(border: Border, shift: float = 1.0) -> bool:
     """Return whether a bisection with comparisons ends within 1 % of an amplitude."""
     case, found, amplitude, rises = border
-    below, above = (
-        compare_renders(case, found.wavelength, shift * amplitude * side) for side in (0.99, 1.01)
+    sides = {0.99: not rises, 1.01: rises}
+    return all(
+        compare_renders(case, found.wavelength, shift * amplitude * side) == is_rendered
+        for side, is_rendered in sides.items()
     )
-    return (below, above) == (not rises, rises)
 
 
 @cache
@@ -90,7 +91,7 @@ def test_random_borders_are_those_of_comparisons() -> None:
 
 
 def test_borders_off_by_three_percent_are_detected() -> None:
-    borders = random_borders(COUNT)[:20]
+    borders = random_borders(COUNT)[:6]
     assert not any(is_border(border, 1.03) or is_border(border, 0.97) for border in borders)
 
 
@@ -100,7 +101,7 @@ LENGTHS = [float(one) for one in np.geomspace(0.05e-3, 20e-3, 12)]
 @pytest.mark.parametrize("law", LAWS)
 def test_borders_do_not_depend_on_the_wavelengths_before(law: str) -> None:
     case = WaveCase(law, {}, asp.load_device("omega.3"), RenderConditions())
-    dense = [float(one) for one in np.geomspace(LENGTHS[0], LENGTHS[-1], 34)]
+    dense = [float(one) for one in np.geomspace(LENGTHS[0], LENGTHS[-1], 34)[6:24]]
     for along, (alone,) in zip(
         find_borders(case, dense)[::3], (find_borders(case, [x]) for x in dense[::3]), strict=True
     ):
@@ -121,7 +122,7 @@ def test_borders_of_the_paper_are_closed_forms() -> None:
 @pytest.fixture(scope="module")
 def two_laws() -> Envelope:
     return envelope(
-        ["omega.3", "pantograph"], "HWC", wavelengths=LENGTHS, surface=["cloth", "sandpaper"]
+        ["omega.3", "pantograph"], "HWC", wavelengths=LENGTHS[::2], surface=["cloth", "sandpaper"]
     )
 
 

@@ -27,7 +27,7 @@ from asperity.perception.grip import load_grip
 LAND = Path(__file__).parents[2].parent / "shared" / "data" / "sample-land.x3p"
 DEVICES = ("touch", "omega.3", "pantograph", "falcon")
 COUNT = 2  # python -m bench.stress.envelopes checks 200
-POINTS = 1000
+POINTS = 300  # there 1000
 FORCE_NAMES = {"RMS": "texture_force", "peak": "peak_force"}
 Case = tuple[Search, Design, float, float]
 """Search, design, and by random search the greatest margin and the greatest force [N]."""
@@ -189,12 +189,13 @@ STEEP = asp.Sinusoid(0.2e-3, 1e-3)
 WAVES = asp.Fourier([1e-4, 5e-5], [[3000.0, 0.0], [0.0, 5000.0]], [0.0, 0.5])
 
 
-@pytest.mark.parametrize("texture", [STEEP, WAVES], ids=["steep", "waves"])
-@pytest.mark.parametrize("letter", "ABCFG")
+@pytest.mark.parametrize(
+    ("letter", "texture"), [("A", STEEP), ("B", STEEP), ("C", WAVES), ("F", STEEP), ("G", WAVES)]
+)
 def test_no_clamp_improves_what_a_design_requires(letter: str, texture: Any) -> None:
     """Requirements hold down to max_depth, where no clamp acts: it may add a greater gain below."""
     plain = asp.compare(texture, "touch", letter, max_depth=2e-4).rows[0]
-    for clamp in CLAMPS:
+    for clamp in CLAMPS.keys() - {plain.surface.clamp}:
         row = asp.compare(texture, "touch", letter, max_depth=2e-4, clamp=clamp).rows[0]
         assert row.recommended_stiffness <= plain.recommended_stiffness, clamp
         assert row.support <= plain.support * (1.0 + 1e-9), clamp
@@ -303,8 +304,8 @@ def test_nothing_is_reachable_where_no_stiffness_suffices() -> None:
 
 
 def test_measured_textures_are_magnified_in_all_directions() -> None:
-    result = design("cloth", "omega.3", "C", texture_force=30e-3)
-    plain = asp.named_surface("cloth")
+    plain = asp.HeightMap(3e-5 * np.random.default_rng(8).normal(size=(12, 10)), (3e-4, 4e-4))
+    result = design(plain, "omega.3", "C", texture_force=30e-3)
     scaled = result.comparison.texture
     assert scaled.peak_to_valley == pytest.approx(result.factor * plain.peak_to_valley, rel=1e-6)
     assert scaled.domain.spans == pytest.approx(result.factor * plain.domain.spans, rel=1e-6)

@@ -60,7 +60,7 @@ def random_surfaces() -> ModuleType:
 def test_bounds_on_random_surfaces_are_correct_and_tight(random_surfaces: ModuleType) -> None:
     seen = set()
 
-    @deterministic_settings(32)
+    @deterministic_settings(12)  # python -m bench.speed.certificates --random COUNT
     @given(st.integers(0, 2**32))
     def holds(seed: int) -> None:
         trial = random_surfaces.run_trial(seed, "ABCDFG", points=60)
@@ -69,7 +69,7 @@ def test_bounds_on_random_surfaces_are_correct_and_tight(random_surfaces: Module
         seen.add((trial.kind, trial.name, trial.bound.method))
 
     holds()
-    assert len(seen) > 18
+    assert len(seen) > 8
 
 
 def test_trials_detect_wrong_bounds(

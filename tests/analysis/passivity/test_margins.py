@@ -38,13 +38,29 @@ from asperity.textures import Sinusoid
 PLAUSIBLE = StabilityLimit(1000.0, "plausible", "wall test")
 
 
-@pytest.mark.parametrize(("letter", "along_lightest"), [("C", False), ("G", True)])
+CYCLING = {
+    ("C", False): (133, 535, 555, 723, 936, 959, 1022, 1166, 1212, 1377, 1456, 1841, 1948),
+    ("G", True): (693, 749, 751, 806, 1057, 1217, 1342, 1458, 1715, 1954),
+}
+"""Numbers of the loops that cycle at the factor, of all with a start."""
+
+
+@pytest.mark.parametrize(("letter", "along_lightest"), CYCLING)
 def test_random_loops_reproduce_the_margin(letter: str, along_lightest: bool) -> None:
-    """``bench.stress.margins`` writes the table; this test repeats the loops at the factor."""
+    """``bench.stress.margins`` writes the table; this repeats the loops that cycle and others."""
     margin = load_margins(along_lightest)[find_law(letter)]
-    found = count_cycles(letter, margin.factor, LOOPS, SEED + 1, along_lightest)
-    assert (found.loops, found.cycles) == (margin.loops, margin.cycles)
-    fastest = max(motion.speed for motion in found.motions)
+    cycling = CYCLING[letter, along_lightest]
+    found = count_cycles(letter, margin.factor, 200, SEED + 1, along_lightest)
+    assert [one.loop for one in found.motions] == [one for one in cycling if one < 200]
+    assert len(cycling) == margin.cycles
+    motions = []
+    for number in cycling:
+        loop = random_loop(SEED + 1, number)
+        q = characteristic_number(loop.surface(letter), 0.05).value
+        wall = loop.wall * (loop.weakest_axis if along_lightest else 1.0)
+        motions.append(lasting_motion(loop, letter, margin.factor * wall / q))
+    fastest = max(motion.speed for motion in motions if motion is not None)
+    assert None not in motions
     assert fastest == pytest.approx(margin.speed, rel=1e-2)
 
 
@@ -60,12 +76,12 @@ def test_at_most_one_percent_of_the_loops_cycle_or_the_factor_is_the_least() -> 
 
 def test_wall_of_k0_rests_in_every_admissible_loop() -> None:
     """Negative control of the study: the wall, proved passive; above its limit it cycles."""
-    assert count_cycles("W", 0.95, 300, SEED).cycles == 0
-    assert count_cycles("W", 3.0, 300, SEED).share > 0.3
+    assert count_cycles("W", 0.95, 100, SEED).cycles == 0
+    assert count_cycles("W", 3.0, 100, SEED).share > 0.3
 
 
 def test_share_grows_with_the_stiffness() -> None:
-    counts = [count_cycles("G", factor, 300, SEED).cycles for factor in (0.05, 0.3, 1.0)]
+    counts = [count_cycles("G", factor, 200, SEED).cycles for factor in (0.05, 0.3, 1.0)]
     assert counts == sorted(counts)
     assert counts[-1] > 10
 
@@ -85,7 +101,7 @@ def test_damping_of_a_random_loop_is_that_of_its_wall_test() -> None:
 def test_no_loop_with_steps_moves_above_the_bound_of_its_steps(letter: str) -> None:
     """Encoders of 55 µm and forces of 10 mN: chatter that is felt, but below the bound."""
     loops, steps, felt = admissible_loops(letter, 11, has_start), (55e-6, 10e-3), 0
-    for loop, q in (next(loops) for _ in range(60)):
+    for loop, q in (next(loops) for _ in range(30)):
         surface = loop.surface(letter).to_stiffness(0.3 * loop.lightest * loop.wall / q)
         data = {
             "damping": float(np.linalg.eigvalsh(loop.damping)[0]),
