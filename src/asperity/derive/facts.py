@@ -78,6 +78,7 @@ def clamped_facts(law: Law, clamp: Clamp) -> LawFacts:
     return replace(facts, conservative=False, reason=reason)
 
 
+@lru_cache(maxsize=64)
 def derive_facts(law: Law) -> LawFacts:
     """Derive the facts of a law from its symbols.
 
@@ -120,13 +121,13 @@ def _is_affine(jacobian: Any) -> bool:
     from asperity.contacts.symbols import DEPTH
     from asperity.derive.derivatives import is_zero
 
-    second = jacobian.diff(DEPTH, 2)
+    second = jacobian.diff(DEPTH).diff(DEPTH)  # of second order SymPy would factor the first
     # A nonzero value at one point decides at once; a proof is tried only if the value is zero.
     point = {
         symbol: Fraction(2 * index + 3, 7 + index)
         for index, symbol in enumerate(sorted(second.free_symbols, key=str))
     }
-    if max([abs(entry.evalf(30, subs=point)) for entry in second]) > 1e-20:
+    if any(abs(entry.evalf(30, subs=point)) > 1e-20 for entry in second):
         return False
     return all(map(is_zero, second))
 
