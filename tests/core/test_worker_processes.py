@@ -214,16 +214,16 @@ def test_onsets_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch, wo
     steps: list[int] = []
     cells = sweeps.sweep_onsets(
         band_setup("W"),
-        "WAC",
+        "WA",
         (0, 3),
         n_phases=2,
         min_stiffness=5.0,
         progress=lambda: steps.append(1),
     ).onsets
     by_law = [f"{cell.onset.law}{cell.onset.delay}" for cell in cells]
-    assert by_law == ["W0", "W3", "A0", "A3", "C0", "C3"]
-    assert len(steps) == 6
-    for cell in cells[::5]:
+    assert by_law == ["W0", "W3", "A0", "A3"]
+    assert len(steps) == 4
+    for cell in cells[::3]:
         setup = band_setup(cell.onset.law)
         single = sweeps.sweep_onsets(
             setup, cell.onset.law, (cell.onset.delay,), n_phases=2, min_stiffness=5.0

@@ -73,10 +73,10 @@ def test_energy_equals_its_definition(name: str, c: float) -> None:
     attained = 0.5 * (c * distance(y) ** 2 / (1.0 + c) - c * square)
     # Chords of 25 nm deviate from the profile by 1e-6 of the smallest of these depths.
     np.testing.assert_allclose(state.potential, attained, rtol=2e-6)
-    result = [_definition(distance, p, c) for p in points[:8, [0, 2]]]
-    assert (np.array(result) <= state.potential[:8] * (1.0 + 2e-6)).all()
+    result = [_definition(distance, p, c) for p in points[:4, [0, 2]]]
+    assert (np.array(result) <= state.potential[:4] * (1.0 + 2e-6)).all()
     # The search is accurate to 2 % even at kinks.
-    assert (np.array(result) >= state.potential[:8] * 0.98).all()
+    assert (np.array(result) >= state.potential[:4] * 0.98).all()
 
 
 def test_plate_pops_through_at_its_depth() -> None:
