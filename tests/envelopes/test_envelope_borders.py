@@ -49,10 +49,9 @@ def compare_renders(case: WaveCase, wavelength: float, amplitude: float) -> bool
 def is_border(border: Border, shift: float = 1.0) -> bool:
     """Return whether a bisection with comparisons ends within 1 % of an amplitude."""
     case, found, amplitude, rises = border
-    sides = {0.99: not rises, 1.01: rises}
     return all(
         compare_renders(case, found.wavelength, shift * amplitude * side) == is_rendered
-        for side, is_rendered in sides.items()
+        for side, is_rendered in ((0.99, not rises), (1.01, rises))
     )
 
 

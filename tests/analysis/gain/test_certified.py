@@ -30,7 +30,6 @@ from tests.helpers.reference import exact_jacobian
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, precise_norm
 from asperity.analysis.gain import proofs
-from asperity.analysis.gain import proofs as friction
 from asperity.analysis.gain.characteristic import certify, curl_number
 from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.analysis.gain.proofs import largest_singular_value
@@ -172,7 +171,7 @@ def test_number_of_law_f_against_a_dense_scan_of_its_definition() -> None:
 @pytest.mark.parametrize("count", [2, 5, 1024])
 def test_half_circle_polygon_corners_lie_on_the_tangents(count: int) -> None:
     """The polygon encloses half the circle: each corner lies on the tangents on both sides."""
-    touch, corner, radius = friction._half_circle(count)
+    touch, corner, radius = proofs._half_circle(count)
     np.testing.assert_allclose(touch[[0, -1]], [-0.5 * math.pi, 0.5 * math.pi], rtol=1e-15)
     assert (len(touch), len(corner)) == (count + 1, count)
     for side in (touch[:-1], touch[1:]):
