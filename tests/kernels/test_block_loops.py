@@ -120,6 +120,11 @@ def test_only_laws_sampled_above_the_probe_use_blocks() -> None:
     assert block_loops.KERNELS.loops == ("force_batch", "jacobian_batch")
 
 
+def has_feature(name: str) -> bool:
+    """Return whether the processor for which code is compiled has a feature."""
+    return bool(dict(binding.get_host_cpu_features()).get(name, False))
+
+
 @pytest.mark.usefixtures("empty_code_cache")
 @pytest.mark.parametrize("texture", [WAVE, height_map(False)])
 @pytest.mark.parametrize("law", "ABCG")
@@ -129,10 +134,12 @@ def test_batches_are_vectorized_and_fused_unlike_scalar_loops(law: str, texture:
     points, out = np.zeros((1, 3)), np.empty((1, 3))
     surface._loops.force_batch(points, out, *arguments)
     (llvm,) = surface._loops.force_batch.inspect_llvm().values()
-    assert re.search(r"<\d+ x double> @llvm\.fmuladd", llvm)
+    # Law G loads the coefficients of a map in contact only, which takes the masks of AVX-512.
+    is_vectorized = law != "G" or texture is WAVE or has_feature("avx512f")
+    assert bool(re.search(r"<\d+ x double> @llvm\.fmuladd", llvm)) == is_vectorized
     assert texture is not WAVE or "gather" not in llvm  # points are loaded contiguously
     surface._path_loops.path_batch(points, out, np.empty((1, 2)), new_warm_start(1.0), *arguments)
-    has_fma = dict(binding.get_host_cpu_features()).get("fma", False)
+    has_fma = has_feature("fma")
     # Of the path loops only those with the batch sine use fused multiply-add.
     path = (surface._path_loops.path_batch, has_fma and texture is WAVE)
     for loop, is_fused in ((surface._loops.force_batch, has_fma), path):
