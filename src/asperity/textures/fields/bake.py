@@ -19,7 +19,7 @@ from asperity.textures.fields.field_certificate import Progress, cells_above, ce
 from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray
 from asperity.textures.fields.field_record import FieldArguments, largest_coefficient, largest_step
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
-from asperity.textures.texture import Texture
+from asperity.textures.texture import CertifiedNumber, Texture
 
 _MAX_PASSES = 15
 # Part of the cells above the goal that a pass may leave and still help.
@@ -51,6 +51,7 @@ _BYTES_PER_NODE = 4
 _FADE = 0.8
 # Greatest q that rounding to bricks was measured to add: 0.001 to 0.010.
 _GAIN_OF_ROUNDING = 0.01
+_UNKNOWN_GAIN = CertifiedNumber(0.0, math.inf, (0.0, 0.0, 0.0))
 # Growth of cells with depth over the share of the goal, of which it then causes about half however
 # close nodes are, and the most.
 _GROWTH_PER_SHARE = 3.0
@@ -206,14 +207,23 @@ class BakePlan:
 
     def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
         """Return the field of a resolution [m]."""
+        field = self.trial(resolution, scale_progress(progress, 0.0, 0.9))
+        return self.certify(field, scale_progress(progress, 0.9, 0.1))
+
+    def trial(self, resolution: float, progress: Progress | None) -> PotentialField:
+        """Return the field of a resolution [m], whose gain is not certified yet."""
         grid = self.grid(resolution)
         self.check_size(grid)
-        first_part = scale_progress(progress, 0.0, 0.9)
         columns = node_potentials.split_columns(self.texture, self.continuity, grid)
         potentials = node_potentials.compute_potentials(
-            columns, grid, first_part, exact=self.columns, continuity=self.continuity
+            columns, grid, progress, exact=self.columns, continuity=self.continuity
         )
-        return self.certify(potentials, grid, scale_progress(progress, 0.9, 0.1))
+        return self.measure(potentials, grid)
+
+    def certify(self, field: PotentialField, progress: Progress | None) -> PotentialField:
+        """Set the certified gain of a field, and return it."""
+        field.gain, field.one_sided = certify_gain(field.grid, field.arguments, progress)
+        return field
 
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:
         """Return the field of the coarsest resolution that reaches the goal.
@@ -228,7 +238,7 @@ class BakePlan:
         last = resolution, np.ones(2)
         for trial in range(_MAX_TRIALS):
             done = 1.0 - 0.5**trial
-            field = self.bake(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
+            field = self.trial(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
             errors = self.relative_errors(field.accuracy)
             is_reached = bool(errors.max() <= 1.0)
             if resolution == limits[is_reached] or 0.5 <= errors.max() <= 1.0:
@@ -242,6 +252,7 @@ class BakePlan:
             resolution = _between(resolution, limits, (finest, coarsest))
         if resolution == finest and not is_reached:
             field.accuracy = replace(field.accuracy, is_limited=True)
+        self.certify(field, None)
         if progress is not None:
             progress(1.0)
         return field
@@ -285,22 +296,18 @@ class BakePlan:
             excess += f" max_bytes = {limit / 1e6:,.1f} MB; {fits}"
             raise ParameterError("resolution", excess, max(grid.spacing))
 
-    def certify(
-        self, potentials: SingleArray, grid: FieldGrid, progress: Progress | None
-    ) -> PotentialField:
-        """Return the field, smoothed until its certified gain reaches the goal.
+    def measure(self, potentials: SingleArray, grid: FieldGrid) -> PotentialField:
+        """Return the field, smoothed until its gain reaches the goal, and its accuracy.
 
         Args:
             potentials: at the nodes of the grid.
             grid: the nodes.
-            progress: called with the finished fraction.
         """
         is_large = potentials.nbytes > BRICK_BYTES
         limit = self.goal.max_gain * self.gain - _GAIN_OF_ROUNDING * is_large
         arguments, passes = self._smooth(potentials, grid, limit)
         if is_large:
             arguments = grid.to_bricks(potentials, arguments)
-        gain, one_sided = certify_gain(grid, arguments, progress)
         sizes = largest_coefficient(arguments), largest_step(arguments)
         force, energy = grid.error_bounds(self.lipschitz, passes, *sizes)
         field = PotentialField(
@@ -310,8 +317,8 @@ class BakePlan:
             max_depth=self.max_depth,
             continuity=self.continuity,
             passes=passes,
-            gain=gain,
-            one_sided=one_sided,
+            gain=_UNKNOWN_GAIN,
+            one_sided=_UNKNOWN_GAIN,
             accuracy=FieldAccuracy(force, energy),
         )
         difference = self._render(field, self.probes)[0] - self.force

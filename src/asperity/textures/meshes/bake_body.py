@@ -289,12 +289,12 @@ class _BodyPlan(bake.BakePlan):
         potential, *force, _depth = self.loops.evaluate(points).T
         return np.stack(force, axis=1), np.sqrt(np.maximum(2.0 * potential, 0.0))
 
-    def bake(self, resolution: float, progress: Progress | None) -> PotentialField:
+    def trial(self, resolution: float, progress: Progress | None) -> PotentialField:
         """See :class:`BakePlan`."""
         grid = self.checked_grid(resolution)
         loops = self.loops
         loops.prepare(grid)
-        part = bake.scale_progress(progress, 0.05, 0.85)
+        part = bake.scale_progress(progress, 0.05, 0.95)
         depths = compute_potentials(loops.record_columns, loops.grid, part)
         thin_map = loops.thin_map(self.max_depth)
         thin = loops.thin_regions(thin_map)
@@ -303,7 +303,7 @@ class _BodyPlan(bake.BakePlan):
         if self.max_depth > deepest:
             reason = f"must be at most {format_length(deepest)}, the greatest depth of the body"
             raise ParameterError("max_depth", reason, self.max_depth)
-        field = self.certify(depths, grid, bake.scale_progress(progress, 0.9, 0.1))
+        field = self.measure(depths, grid)
         field.thin_regions = thin
         field.thin_map = thin_map if thin else None
         return field
