@@ -155,9 +155,7 @@ def list_participants(folder: str | Path) -> dict[str, int]:
     Raises:
         ParameterError: for a participant whose number cannot be read.
     """
-    numbered = []
-    for path in _list_folders(folder):
-        numbered.append((_read_number(path), path.name))
+    numbered = [(_read_number(path), path.name) for path in _list_folders(folder)]
     return {code: number for number, code in sorted(numbered)}
 
 

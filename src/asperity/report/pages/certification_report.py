@@ -188,24 +188,23 @@ def recordings_page(results: Sequence[RecordedCertification]) -> Page:
 
 
 def _recording_rows(results: Sequence[RecordedCertification]) -> list[tuple[str, ...]]:
-    columns = []
-    for result in results:
-        columns.append(
-            {
-                "samples": str(result.samples),
-                "period": format_quantity(result.period, "s", digits=4),
-                "late, missing": f"{result.late_samples}, {result.missing_samples}",
-                "energy, held force": format_quantity(result.energy, "J", digits=4),
-                "energy, trapezoidal": format_quantity(result.trapezoidal_energy, "J", digits=4),
-                "greatest energy given": format_quantity(result.violation, "J", digits=4),
-                "there": point_text(result.violated_at),
-                "gain, at least": format_quantity(result.gain, "N/m", digits=4),
-                "stiffness in contact": _quantity_or_none(result.stiffness, "N/m"),
-                "lag [samples]": str(result.lag),
-                "greatest force": format_quantity(result.largest_force, "N", digits=4),
-                "greatest step of force": format_quantity(result.largest_force_step, "N", digits=4),
-            }
-        )
+    columns = [
+        {
+            "samples": str(result.samples),
+            "period": format_quantity(result.period, "s", digits=4),
+            "late, missing": f"{result.late_samples}, {result.missing_samples}",
+            "energy, held force": format_quantity(result.energy, "J", digits=4),
+            "energy, trapezoidal": format_quantity(result.trapezoidal_energy, "J", digits=4),
+            "greatest energy given": format_quantity(result.violation, "J", digits=4),
+            "there": point_text(result.violated_at),
+            "gain, at least": format_quantity(result.gain, "N/m", digits=4),
+            "stiffness in contact": _quantity_or_none(result.stiffness, "N/m"),
+            "lag [samples]": str(result.lag),
+            "greatest force": format_quantity(result.largest_force, "N", digits=4),
+            "greatest step of force": format_quantity(result.largest_force_step, "N", digits=4),
+        }
+        for result in results
+    ]
     return [(name, *[column[name] for column in columns]) for name in columns[0]]
 
 
