@@ -8,14 +8,17 @@ on one (such as knurl) for some laws (such as BG);
 0.7 s each, and prints how many had a fault;
 ``python -m bench.stress.certification jumps [CELLS [SECONDS]]`` prints in how many of the connected
 sets of jumps of law D, as a grid of so many cells along each axis (100 by default) shows them, a
-search of so many seconds (30 by default) finds one.
+search of so many seconds (10 by default) finds one, on all cores.
 """
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -29,6 +32,7 @@ from scipy.interpolate import RectBivariateSpline
 from asperity import certify, characteristic_number, export_code, named_surface, worst_loop
 from asperity.certification.certify import Certification
 from asperity.core.checks import FloatArray
+from asperity.core.processes import available_cores
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 from bench.speed import c_programs, cases
@@ -40,6 +44,11 @@ STEPS = ("exact", "single", "encoder", "force steps", "both", "noise", "rare noi
 _BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
 _NODES = 24
 CONTROL_SECONDS = 0.7
+_PROGRAM = """import pathlib, pickle
+surface = pickle.loads((pathlib.Path(__file__).parent / "surface.pickle").read_bytes())
+surface.force([[0.0, 0.0, 1.0]])
+force = surface.force
+"""
 
 
 def search_laws(seconds: float, surface_name: str | None = None, laws: str = LAWS) -> None:
@@ -62,7 +71,10 @@ def search_laws(seconds: float, surface_name: str | None = None, laws: str = LAW
 
 
 def _search(surface: Surface, seconds: float) -> Certification:
-    """Return what is found of a law in its working region; one with memory is compiled from C."""
+    """Return what is found of a law in its working region.
+
+    A law with memory is compiled from C; D, each of whose forces is a search, runs on all cores.
+    """
     renderer: Any = surface.force
     with TemporaryDirectory() as folder:
         if surface.law.stateful:
@@ -71,6 +83,10 @@ def _search(surface: Surface, seconds: float) -> Certification:
             c_programs.run_command(
                 "cc", "-O2", "-shared", "-fPIC", f"{folder}/texture.c", "-lm", "-o", renderer
             )
+        elif surface.law.letter == "D":
+            Path(f"{folder}/surface.pickle").write_bytes(pickle.dumps(surface))
+            renderer = f"{folder}/renderer.py"
+            Path(renderer).write_text(_PROGRAM)
         return certify(
             renderer,
             region=_box(surface.texture, surface.max_depth),
@@ -98,10 +114,12 @@ def _working_region(surface: Surface) -> Callable[[FloatArray], NDArray[np.bool_
         depth = surface.law.contact.depth(surface.texture, points)
         return np.asarray((depth > 0.0) & (depth <= surface.max_depth))
 
-    return contains
+    cores = available_cores()
+    pool = ThreadPoolExecutor(cores)
+    return lambda points: np.concatenate([*pool.map(contains, np.array_split(points, cores))])
 
 
-def search_jumps(cells: int, seconds: float = 30.0) -> None:
+def search_jumps(cells: int, seconds: float = 10.0) -> None:
     """Print in how many connected sets of jumps of D, as a grid shows them, one was found.
 
     A pair of neighbours of the grid shows a jump where the closest point still jumps after twelve
@@ -115,7 +133,7 @@ def search_jumps(cells: int, seconds: float = 30.0) -> None:
         box = _box(texture, surface.max_depth)
         inside = _working_region(surface)
         labels, count = jump_sets(surface, box, inside, cells)
-        found = certify(surface.force, region=box, inside=inside, seconds=seconds)
+        found = _search(surface, seconds)
         places = np.array([jump.at for jump in found.jumps]).reshape(-1, 3)
         numbers = (count, len(found_sets(labels, box, places)), len(places))
         table.add_row(name, *map(str, numbers), f"{found.calls:.2g}")

@@ -44,7 +44,16 @@ from asperity.core.units import count_text, format_quantity
 
 DEFAULT_SECONDS = 10.0
 """Time of a search [s]."""
-_SHARES = {"gain": 0.4, "one-sided gain": 0.12, "jumps": 0.2, "loops": 0.28}
+_SHARES = {
+    "first gain": 0.1,
+    "first jumps": 0.05,
+    "gain": 0.3,
+    "jumps": 0.15,
+    "one-sided gain": 0.12,
+    "loops": 0.28,
+}
+_SHARE_OF_KNOWN_JUMPS = 1.6
+"""Share of the search for more jumps once one is known, in place of the search for the gain."""
 _FIRST_CALLS = 4096
 _COST_CALLS = 10_000
 _PLACES = 512
@@ -297,6 +306,7 @@ class _Search:
     seed: int
     progress: Progress
     started: float = field(default_factory=time.monotonic)
+    shares: dict[str, float] = field(default_factory=_SHARES.copy)
 
     def run(self) -> Certification:
         """Return what was found.
@@ -351,8 +361,13 @@ class _Search:
         calls = self.calls
         gain = GainSearch(calls, resolution, False, self.seed)
         one_sided = GainSearch(calls, resolution, True, self.seed + 1)
-        self._search_gain(gain, "gain")
         jumps = JumpSearch(calls, resolution, self.seed)
+        self._search_gain(gain, "first gain")
+        jumps.run(self._deadline("first jumps"), gain.best)
+        if not jumps.jumps:
+            self._search_gain(gain, "gain")
+        if jumps.jumps:
+            self.shares["jumps"] = _SHARE_OF_KNOWN_JUMPS
         jumps.run(self._deadline("jumps"), gain.best)
         steep = jumps.steepest
         if len(steep):
@@ -403,15 +418,15 @@ class _Search:
         return contact, points[has_force][order[:_PLACES]]
 
     def _search_gain(self, search: GainSearch, name: str) -> None:
-        climbs = number_of_climbs(search.calls, _SHARES[name] * self.seconds)
+        climbs = number_of_climbs(search.calls, self.shares[name] * self.seconds)
         search.run(self._deadline(name), climbs, self._report)
 
     def _deadline(self, name: str) -> float:
         """Return when a search ends: its share of what is left of the time."""
-        names = ["gain", "jumps", "one-sided gain", "loops"]
-        left = sum(_SHARES[other] for other in names[names.index(name) :])
+        names = list(self.shares)
+        left = sum(self.shares[other] for other in names[names.index(name) :])
         now = time.monotonic()
-        return now + max(self.started + self.seconds - now, 0.0) * _SHARES[name] / left
+        return now + max(self.started + self.seconds - now, 0.0) * self.shares[name] / left
 
     def _report(self, text: str) -> None:
         fraction = (time.monotonic() - self.started) / self.seconds

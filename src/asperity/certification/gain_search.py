@@ -133,15 +133,16 @@ class GainSearch:
         region = self.calls.region
         step = self.resolution.secant
         stencils = np.repeat(places[:, :1], 4, axis=1)
-        for axis in range(3):
-            stencils[:, axis + 1, axis] += step
-            is_outside = ~region.contains(stencils[:, axis + 1])
-            stencils[is_outside, axis + 1, axis] -= 2.0 * step
+        ends = stencils[:, 1:]
+        axes = np.arange(3)
+        ends[:, axes, axes] += step
+        inside = region.contains(ends.reshape(-1, 3)).reshape(-1, 3)
+        steps = np.where(inside, step, -step)
+        ends[:, axes, axes] += steps - step
+        inside[~inside] = region.contains(ends[~inside])
         forces = self.calls.after(places[:, -1], places[:, 0], stencils)
-        steps = np.diagonal(stencils[:, 1:] - stencils[:, :1], axis1=1, axis2=2)
         jacobians = np.swapaxes((forces[:, 1:] - forces[:, :1]) / steps[:, :, None], 1, 2)
-        inside = region.contains(stencils.reshape(-1, 3)).reshape(-1, 4).all(axis=1)
-        is_valid = np.asarray(inside & np.isfinite(jacobians).all(axis=(1, 2)))
+        is_valid = np.asarray(inside.all(axis=1) & np.isfinite(jacobians).all(axis=(1, 2)))
         jacobians[~is_valid] = 0.0
         return jacobians, is_valid
 

@@ -38,7 +38,7 @@ _POINTS_PER_NODE = 32
 _BORDER_NODES = 64
 _BORDER_SAMPLES = 512
 _LIFTS = 3
-_FOLLOWING_SHARE = 0.3
+_FOLLOWING_SHARE = 0.4
 _TILT = 1.5
 _LEAST_REACH = 0.004
 _CELLS = 100
@@ -89,6 +89,7 @@ class JumpSearch:
         self._halton = qmc.Halton(1, seed=seed)
         self._new: list[_Segments] = []
         self._jumps: dict[tuple[int, ...], ForceJump] = {}
+        self._followed: set[tuple[tuple[int, ...], int]] = set()
         self._shortest = max(_SHORTEST, 20.0 * resolution.position_error)
 
     @property
@@ -97,7 +98,7 @@ class JumpSearch:
         return tuple(sorted(self._jumps.values(), key=lambda jump: -jump.size))
 
     def run(self, deadline: float, steepest: GainWitness | None) -> None:
-        """Search until a time of the monotonic clock [s].
+        """Search until a time of the monotonic clock [s]; a second time, go on.
 
         Args:
             deadline: the time.
@@ -120,10 +121,11 @@ class JumpSearch:
             samples = min(samples, int(size / (32.0 * self._shortest)) + 8)
             lines = self._random_lines(max(batch // samples, 1), samples)
             inside = self.calls.region.contains(lines.reshape(-1, 3)).reshape(lines.shape[:2])
-            self._search_lines(lines, inside, gain)
+            forces = np.where(inside[:, :, None], self.calls.on_curves(lines), np.nan)
+            self._search_lines(lines, forces, gain)
             samples = min(samples, _BORDER_SAMPLES)
             lines = self._border_lines(border, max(batch // (2 * samples), 1), samples)
-            self._search_lines(lines, np.ones(lines.shape[:2], dtype=bool), gain)
+            self._search_lines(lines, self.calls.on_curves(lines), gain)
             if time.monotonic() >= followed_from:
                 self._follow_surfaces(gain, deadline)
             if time.monotonic() >= deadline:
@@ -173,9 +175,8 @@ class JumpSearch:
         shares = np.linspace(0.0, 1.0, samples)[:, None]
         return np.asarray(ends[:, :1] + shares * (ends[:, 1:] - ends[:, :1]))
 
-    def _search_lines(self, lines: FloatArray, used: NDArray[np.bool_], gain: float) -> None:
-        """Search lines, shape (n, m, 3), at samples that are used, shape (n, m)."""
-        forces = np.where(used[:, :, None], self.calls.on_curves(lines), np.nan)
+    def _search_lines(self, lines: FloatArray, forces: FloatArray, gain: float) -> None:
+        """Search lines with the forces at their samples, shape (n, m, 3) both."""
         line, first = self._bent_samples(lines, forces)
         steps = np.diff(forces, axis=1)
         trend = 0.5 * (steps[line, first - 1] + steps[line, first + 2])
@@ -193,23 +194,36 @@ class JumpSearch:
         )
 
     def _follow_surfaces(self, gain: float, deadline: float) -> None:
-        """Search beside new jumps, from cell to cell along their surface."""
+        """Search beside new jumps, from cell to cell along their surface, all at once."""
         cell = self.calls.region.size / _CELLS
         while self._new and time.monotonic() < deadline:
-            segments = self._new.pop(0)
+            segments = _join_segments(self._new)
+            self._new = []
             along = np.argmax(np.abs(segments.direction) / cell, axis=1)
             for shift in (1, 2):
                 offsets = cell * (np.arange(3) == ((along + shift) % 3)[:, None])
                 for sign in (1.0, -1.0):
-                    self._bisect(self._segments_beside(segments, sign * offsets), gain)
+                    chosen = self._untried(segments, sign * offsets)
+                    beside = segments.select(chosen), sign * offsets[chosen]
+                    self._bisect(self._segments_beside(*beside), gain)
+
+    def _untried(self, segments: _Segments, offsets: FloatArray) -> NDArray[np.bool_]:
+        """Return one segment for each cell and axis beside which none was followed yet."""
+        chosen = np.zeros(len(offsets), dtype=bool)
+        cells = self._cells(segments.middle + offsets)
+        axes = np.argmax(np.abs(segments.direction), axis=1).tolist()
+        for index, key in enumerate(zip(cells, axes, strict=True)):
+            chosen[index] = key not in self._followed
+            self._followed.add(key)
+        return chosen
 
     def _segments_beside(self, segments: _Segments, offsets: FloatArray) -> _Segments:
         """Return longer segments at offsets from some, where no jump is known, in the region."""
         middle = segments.middle + offsets
         spread = np.sqrt(np.square(offsets).sum(axis=1))[:, None]
         reach = (_TILT * spread + _LEAST_REACH * self.calls.region.size) * segments.direction
-        chosen = self.calls.region.contains(middle)
-        chosen[chosen] = [self._cell(at) not in self._jumps for at in middle[chosen]]
+        chosen = self._is_unknown(middle)
+        chosen[chosen] = self.calls.region.contains(middle[chosen])
         ends = (segments.approach, middle - reach, middle + reach, segments.trend)
         return _find_segments(self.calls, *[array[chosen] for array in ends])
 
@@ -221,7 +235,7 @@ class JumpSearch:
         line = np.repeat(np.arange(len(lines)), first.shape[1])
         first = first.ravel()
         chosen = bends[line, first] > self.resolution.force_error
-        chosen &= [self._cell(at) not in self._jumps for at in lines[line, first + 1]]
+        chosen &= self._is_unknown(lines[line, first + 1])
         return line[chosen], first[chosen]
 
     def _bisect(self, segments: _Segments, gain: float) -> _Segments:
@@ -245,39 +259,57 @@ class JumpSearch:
     def _record_jumps(
         self, segments: _Segments, changes: list[FloatArray], gain: float
     ) -> _Segments:
-        paths = approach_paths(segments.approach, segments.start, segments.end)
-        size = changes[-1]
-        for _ in range(_REPEATS):  # noise that is rare does not come again
-            size = np.minimum(size, step_changes(self.calls.along(paths))[1])
-        before = np.maximum(changes[-1 - _HALVINGS], 1e-300)
-        exponents = np.log2(np.maximum(size, 1e-300) / before) / -_HALVINGS
-        explained = 3.0 * self.resolution.explained(gain) + 1e-9 * self.calls.largest_force
         lengths = segments.lengths
-        is_jump = (exponents < _JUMP_EXPONENT) & (size > explained + gain * lengths)
-        steepest = int(np.argmax(np.where(is_jump, 0.0, size / lengths)))
+        explained = 3.0 * self.resolution.explained(gain) + 1e-9 * self.calls.largest_force
+        is_jump, _exponents = _jumps_among(changes, explained + gain * lengths)
+        steepest = int(np.argmax(np.where(is_jump, 0.0, changes[-1] / lengths)))
         ends = [segments.start[steepest], segments.end[steepest]]
         self.steepest = np.concatenate([self.steepest, [ends]])
+        segments = segments.select(is_jump)
+        changes = [change[is_jump] for change in changes]
+        lengths = lengths[is_jump]
+        paths = approach_paths(segments.approach, segments.start, segments.end)
+        if not self.calls.approaches:
+            paths = paths[:, -3:]  # a rest and the step
+        for _ in range(_REPEATS):  # noise that is rare does not come again
+            changes[-1] = np.minimum(changes[-1], step_changes(self.calls.along(paths))[1])
+        is_jump, exponents = _jumps_among(changes, explained + gain * lengths)
+        size = changes[-1]
         middle = segments.middle
-        is_inside = self.calls.region.contains(middle)
-        is_new = is_jump & is_inside
-        is_new[is_new] = [self._cell(at) not in self._jumps for at in middle[is_new]]
-        self._new.append(segments.select(is_new))
-        for index in np.flatnonzero(is_jump & is_inside):
-            at, along, approach = [
-                tuple(row[index].tolist())
-                for row in (middle, segments.direction, segments.approach)
-            ]
-            found, over, exponent = [float(row[index]) for row in (size, lengths, exponents)]
-            cell = self._cell(middle[index])
-            known = self._jumps.get(cell)
-            if known is None or found > known.size:
-                self._jumps[cell] = ForceJump(at, along, found, over, exponent, approach)
+        cells = self._cells(middle)
+        is_inside = is_jump.copy()
+        is_inside[is_jump] = self.calls.region.contains(middle[is_jump])
+        self._new.append(segments.select(is_inside & self._is_unknown(middle)))
+        for index in np.flatnonzero(is_inside).tolist():
+            known = self._jumps.get(cells[index])
+            if known is None or size[index] > known.size:
+                at, along, approach = [
+                    tuple(row[index].tolist())
+                    for row in (middle, segments.direction, segments.approach)
+                ]
+                found, over, exponent = [float(row[index]) for row in (size, lengths, exponents)]
+                self._jumps[cells[index]] = ForceJump(at, along, found, over, exponent, approach)
         return segments.select(is_jump & ~is_inside)
 
-    def _cell(self, at: FloatArray) -> tuple[int, ...]:
+    def _cells(self, points: FloatArray) -> list[tuple[int, ...]]:
+        """Return the cells of points, shape (n, 3)."""
         region = self.calls.region
-        cell = np.floor(_CELLS * (at - region.low) / region.size)
-        return tuple(cell.astype(int).tolist())
+        cells = np.floor(_CELLS * (points - region.low) / region.size)
+        return list(map(tuple, cells.astype(int).tolist()))
+
+    def _is_unknown(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return in the cells of which points, shape (n, 3), no jump is known, shape (n,)."""
+        return np.array([cell not in self._jumps for cell in self._cells(points)], dtype=bool)
+
+
+def _jumps_among(
+    changes: list[FloatArray], explained: FloatArray
+) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Return which changes of halved segments [N] are jumps, and the exponents of their length."""
+    size = changes[-1]
+    before = np.maximum(changes[-1 - _HALVINGS], 1e-300)
+    exponents = np.log2(np.maximum(size, 1e-300) / before) / -_HALVINGS
+    return (exponents < _JUMP_EXPONENT) & (size > explained), exponents
 
 
 def _excess(start: FloatArray, end: FloatArray, trend: FloatArray) -> FloatArray:
@@ -342,6 +374,12 @@ class _Segments:
         self.start_force = np.where(goes_right, force, self.start_force)
         self.end = np.where(goes_right, self.end, middle)
         self.end_force = np.where(goes_right, self.end_force, force)
+
+
+def _join_segments(parts: list[_Segments]) -> _Segments:
+    """Return all segments of several."""
+    arrays = zip(*[vars(part).values() for part in parts], strict=True)
+    return _Segments(*[np.concatenate(part) for part in arrays])
 
 
 def _interpolate_rows(rows: FloatArray, fractions: FloatArray) -> FloatArray:

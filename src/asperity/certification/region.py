@@ -161,9 +161,9 @@ class RendererCalls:
         """
         if not self.approaches:
             return self.at(points.reshape(-1, 3)).reshape(points.shape)
-        paths = []
-        for index in range(points.shape[1]):
-            paths.append(approach_paths(approaches, starts, points[:, index]))
+        paths = [
+            approach_paths(approaches, starts, points[:, index]) for index in range(points.shape[1])
+        ]
         forces = self.along(np.concatenate(paths))[:, -1]
         return np.swapaxes(forces.reshape(points.shape[1], -1, 3), 0, 1)
 
