@@ -146,7 +146,8 @@ def test_the_probe_is_where_the_loop_has_it(page: Browser) -> None:
     for share in (0.3, 0.6):
         page.mouse("mouseMoved", box["x"] + share * box["width"], box["y"] + 0.2 * box["height"])
         page.until("lab.hand.requestCount > 0 && lab.hand.requestCount <= lab.frame.acknowledged")
-        page.ask("new Promise(done => setTimeout(done, 600))")  # until it rests
+        page.let_loop_run(1.2)  # until it rests
+        page.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         got = shown(page, "section")
         high, wide = got.shape[:2]
         left, right, bottom, top = page.ask("lab.section.box")
