@@ -244,7 +244,7 @@ class Friction:
 
 
 def test_function_with_a_reset_may_have_memory() -> None:
-    result = certify(Friction(), region=BOX, seconds=4.0)
+    result = certify(Friction(), region=BOX, seconds=2.0)
     assert result.history.spread > 0.02
     assert result.history.is_reset
 

@@ -252,9 +252,8 @@ class BakePlan:
             resolution = _between(resolution, limits, (finest, coarsest))
         if resolution == finest and not is_reached:
             field.accuracy = replace(field.accuracy, is_limited=True)
-        self.certify(field, None)
-        if progress is not None:
-            progress(1.0)
+        left = 0.5 ** (trial + 1)
+        self.certify(field, scale_progress(progress, 1.0 - left, left))
         return field
 
     def relative_errors(self, accuracy: FieldAccuracy) -> FloatArray:
