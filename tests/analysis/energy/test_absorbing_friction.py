@@ -25,7 +25,7 @@ STRETCH = math.hypot(1.0, SLOPE)
 KNOWN = (
     ("A", 0.2875, K * DEPTH * SLOPE / STRETCH),
     ("B", 0.0998, K * DEPTH * (STRETCH - 1.0) / (STRETCH + 1.0)),
-    ("E", 0.2094, K * DEPTH * SLOPE / STRETCH),
+    ("E", 0.2095, K * DEPTH * SLOPE / STRETCH),
     ("G", 0.2305, K * DEPTH * SLOPE / STRETCH),
 )
 # Law, law whose force is -∇U, and its share c as a function of the stretch S.

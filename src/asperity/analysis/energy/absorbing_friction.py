@@ -40,7 +40,7 @@ _REFINEMENT = 4
 _STEPS = 400
 # A climb ends when so many steps raise the value by less than this share.
 _STALLED_STEPS = 10
-_STALLED_GAIN = 1e-4
+_STALLED_GAIN = 1e-5
 _MEMORY = 10
 _HALVINGS = 6
 _FIRST_STEP = 0.02
