@@ -66,10 +66,11 @@ def test_gain_and_leak_of_laws_are_found(letter: str) -> None:
 def test_jumps_of_the_god_object_are_found_and_no_loop() -> None:
     _surface, result = certify_law("D")
     assert result.worst_loop is None
-    assert result.jumps[0].exponent < 1e-3
+    assert result.jumps
     for jump in result.jumps:
         # At the edge of the medial axis a jump is small beside the slope that it ends.
-        assert jump.exponent < 0.1
+        is_small = jump.size < 0.05 * result.jumps[0].size
+        assert jump.exponent < (0.1 if is_small else 0.01)
         # The medial axis is below the crests at l/4.
         assert abs(jump.at[0] % 2e-3 - 0.5e-3) < 1e-8
 
