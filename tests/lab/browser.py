@@ -120,6 +120,23 @@ class Browser:
         end = self.ask("lab.frame.newest[0]") + duration
         self.until(f"lab.frame.newest[0] > {end}")
 
+    def let_drawings_settle(self) -> None:
+        """Wait until relief and section are painted in the size of their places, which stay."""
+        self.until(
+            "lab.hasCurrentPictures && [lab.relief, lab.section].every(({ scaledCanvas: s }) => "
+            "!s.needsRepaint && Math.abs(s.width * s.unit - s.element.clientWidth) < 1"
+            " && Math.abs(s.height * s.unit - s.element.clientHeight) < 1)"
+        )
+        places = (
+            "JSON.stringify(['relief', 'section'].map("
+            "name => document.getElementById(name).getBoundingClientRect()))"
+        )
+        self.until(
+            f"(async () => {{ const before = {places};"
+            "for (let k = 0; k < 10; k++) await new Promise(requestAnimationFrame);"
+            f"return before === {places}; }})()"
+        )
+
     def expect_text(self, name: str, text: str, *, exact: bool = True) -> None:
         """Wait until the element of an id has a text, or begins with it."""
         content = f"document.getElementById('{name}').textContent"

@@ -20,6 +20,7 @@ Heights = Callable[[FloatArray, FloatArray], FloatArray]
 
 def shown(page: Browser, name: str) -> FloatArray:
     """Return the pixels of a view (rows, columns, 3)."""
+    page.let_drawings_settle()
     box = page.ask(f"document.getElementById('{name}').getBoundingClientRect().toJSON()")
     whole = np.asarray(Image.open(BytesIO(page.picture())).convert("RGB"), float)
     top, left = round(box["y"]), round(box["x"])
@@ -103,7 +104,6 @@ def test_the_relief_is_the_surface(page: Browser, dark: bool) -> None:
     # Painted in the colours of the day or of the night, and on the screen.
     low = "getComputedStyle(document.documentElement).getPropertyValue('--low').trim()"
     page.until(f"lab.relief.paintKey === {low}")
-    page.ask("new Promise(done => setTimeout(done, 300))")
     got = shown(page, "relief")
     high, wide = got.shape[:2]
     differs = {}
@@ -121,7 +121,6 @@ def test_the_relief_is_the_surface(page: Browser, dark: bool) -> None:
 @needs_browser
 def test_the_cut_is_the_surface_under_the_probe(page: Browser) -> None:
     page.resize(1280, 900)
-    page.ask("new Promise(done => setTimeout(done, 300))")
     got, ink = shown(page, "section"), colour(page, "ink")
     high, wide = got.shape[:2]
     left, right, bottom, top = page.ask("lab.section.box")
