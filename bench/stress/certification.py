@@ -108,11 +108,19 @@ def _box(texture: Texture, depth: float) -> FloatArray:
 
 
 def _working_region(surface: Surface) -> Callable[[FloatArray], NDArray[np.bool_]]:
-    """Return whether points are no deeper than max_depth, the depth being that of the contact."""
+    """Return whether points are no deeper than max_depth, the depth being that of the contact.
+
+    No depth is greater than that below the surface, which is looked at first: it takes no search.
+    """
 
     def contains(points: FloatArray) -> NDArray[np.bool_]:
-        depth = surface.law.contact.depth(surface.texture, points)
-        return np.asarray((depth > 0.0) & (depth <= surface.max_depth))
+        vertical = surface.texture.height(points[:, :2]) - points[:, 2]
+        is_inside = (vertical > 0.0) & (vertical <= surface.max_depth)
+        deep = np.flatnonzero(vertical > surface.max_depth)
+        is_inside[deep] = (
+            surface.law.contact.depth(surface.texture, points[deep]) <= surface.max_depth
+        )
+        return np.asarray(is_inside)
 
     cores = available_cores()
     pool = ThreadPoolExecutor(cores)

@@ -38,7 +38,7 @@ _POINTS_PER_NODE = 32
 _BORDER_NODES = 64
 _BORDER_SAMPLES = 512
 _LIFTS = 3
-_FOLLOWING_SHARE = 0.4
+_FOLLOWING_SHARE = 0.45
 _TILT = 1.5
 _LEAST_REACH = 0.004
 _CELLS = 100
@@ -120,9 +120,7 @@ class JumpSearch:
             size = float(np.sqrt(np.square(self.calls.region.size).sum()))
             samples = min(samples, int(size / (32.0 * self._shortest)) + 8)
             lines = self._random_lines(max(batch // samples, 1), samples)
-            inside = self.calls.region.contains(lines.reshape(-1, 3)).reshape(lines.shape[:2])
-            forces = np.where(inside[:, :, None], self.calls.on_curves(lines), np.nan)
-            self._search_lines(lines, forces, gain)
+            self._search_lines(lines, self.calls.inside_on_curves(lines), gain)
             samples = min(samples, _BORDER_SAMPLES)
             lines = self._border_lines(border, max(batch // (2 * samples), 1), samples)
             self._search_lines(lines, self.calls.on_curves(lines), gain)
@@ -189,9 +187,11 @@ class JumpSearch:
 
     def _segments_above(self, segments: _Segments) -> _Segments:
         """Return segments outside of the region as longer ones at its border above."""
-        return self._segments_beside(
-            segments, self.calls.region.lowest_points(segments.middle) - segments.middle
-        )
+        segments = segments.select(self._one_per_cell(segments.middle))
+        border = self.calls.region.lowest_points(segments.middle)
+        chosen = self._one_per_cell(border)
+        segments = segments.select(chosen)
+        return self._segments_beside(segments, border[chosen] - segments.middle)
 
     def _follow_surfaces(self, gain: float, deadline: float) -> None:
         """Search beside new jumps, from cell to cell along their surface, all at once."""
@@ -246,8 +246,8 @@ class JumpSearch:
         """
         changes = [segments.excess]
         while segments.lengths.max(initial=0.0) > self._shortest:
-            if len(changes) == _TRIED_HALVINGS:  # most are smooth
-                is_left = changes[-1] > _LEFT * changes[0]
+            if len(changes) % _TRIED_HALVINGS == 0:  # most are smooth
+                is_left = self._are_left(segments, changes)
                 segments = segments.select(is_left)
                 changes = [change[is_left] for change in changes]
             segments.halve(self.calls)
@@ -255,6 +255,20 @@ class JumpSearch:
         if len(changes) <= _HALVINGS or not len(changes[0]):  # short as the resolution, or none
             return segments.select(np.zeros(len(changes[0]), dtype=bool))
         return self._record_jumps(segments, changes, gain)
+
+    def _are_left(self, segments: _Segments, changes: list[FloatArray]) -> NDArray[np.bool_]:
+        """Return which segments keep their change, the largest of a cell where no jump is known."""
+        is_left = changes[-1] > _LEFT * changes[-_TRIED_HALVINGS]
+        cells = self._cells(segments.start)
+        ends = self._cells(segments.end)
+        seen: set[tuple[int, ...]] = set()
+        for index in np.argsort(-changes[-1]).tolist():
+            cell = cells[index]
+            if is_left[index] and cell == ends[index]:
+                is_left[index] = cell not in seen and cell not in self._jumps
+                if len(changes) > _TRIED_HALVINGS:  # a change that stayed so long is a jump
+                    seen.add(cell)
+        return np.asarray(is_left)
 
     def _record_jumps(
         self, segments: _Segments, changes: list[FloatArray], gain: float
@@ -268,11 +282,7 @@ class JumpSearch:
         segments = segments.select(is_jump)
         changes = [change[is_jump] for change in changes]
         lengths = lengths[is_jump]
-        paths = approach_paths(segments.approach, segments.start, segments.end)
-        if not self.calls.approaches:
-            paths = paths[:, -3:]  # a rest and the step
-        for _ in range(_REPEATS):  # noise that is rare does not come again
-            changes[-1] = np.minimum(changes[-1], step_changes(self.calls.along(paths))[1])
+        changes[-1] = np.minimum(changes[-1], self._repeated_changes(segments))
         is_jump, exponents = _jumps_among(changes, explained + gain * lengths)
         size = changes[-1]
         middle = segments.middle
@@ -291,11 +301,27 @@ class JumpSearch:
                 self._jumps[cells[index]] = ForceJump(at, along, found, over, exponent, approach)
         return segments.select(is_jump & ~is_inside)
 
+    def _repeated_changes(self, segments: _Segments) -> FloatArray:
+        """Return the least change in repetitions [N], since rare noise does not come again."""
+        if self.calls.approaches:
+            paths = approach_paths(segments.approach, segments.start, segments.end)
+            forces = self.calls.along(np.concatenate([paths] * _REPEATS))
+            sizes = step_changes(forces)[1]
+        else:
+            ends = np.stack([segments.start, segments.end], axis=1)
+            forces = self.calls.on_curves(np.concatenate([ends] * _REPEATS))
+            sizes = np.sqrt(np.square(forces[:, 1] - forces[:, 0]).sum(axis=1))
+        return np.asarray(sizes.reshape(_REPEATS, -1).min(axis=0))
+
     def _cells(self, points: FloatArray) -> list[tuple[int, ...]]:
         """Return the cells of points, shape (n, 3)."""
         region = self.calls.region
         cells = np.floor(_CELLS * (points - region.low) / region.size)
         return list(map(tuple, cells.astype(int).tolist()))
+
+    def _one_per_cell(self, points: FloatArray) -> IntArray:
+        """Return the index of one point for each cell of points, shape (n, 3)."""
+        return np.unique(self._cells(points), axis=0, return_index=True)[1]
 
     def _is_unknown(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return in the cells of which points, shape (n, 3), no jump is known, shape (n,)."""

@@ -148,6 +148,15 @@ class RendererCalls:
             return self.along(curves)
         return self.at(curves.reshape(-1, 3)).reshape(curves.shape)
 
+    def inside_on_curves(self, curves: FloatArray) -> FloatArray:
+        """Return forces on curves as above; NaN outside of the region."""
+        inside = self.region.contains(curves.reshape(-1, 3)).reshape(curves.shape[:2])
+        if self.approaches:
+            return np.where(inside[:, :, None], self.along(curves), np.nan)
+        forces = np.full(curves.shape, np.nan)
+        forces[inside] = self.at(curves[inside])
+        return forces
+
     def after(self, approaches: FloatArray, starts: FloatArray, points: FloatArray) -> FloatArray:
         """Return the forces at points [N], shape (n, m, 3).
 
