@@ -108,23 +108,40 @@ def _box(texture: Texture, depth: float) -> FloatArray:
 
 
 def _working_region(surface: Surface) -> Callable[[FloatArray], NDArray[np.bool_]]:
-    """Return whether points are no deeper than max_depth, the depth being that of the contact.
-
-    No depth is greater than that below the surface, which is looked at first: it takes no search.
-    """
+    """Return whether points are no deeper than max_depth, the depth being that of the contact."""
+    texture = surface.texture
+    contact = surface.law.contact
+    if contact.has_warm_start:
+        return _region_by_search(surface)
 
     def contains(points: FloatArray) -> NDArray[np.bool_]:
-        vertical = surface.texture.height(points[:, :2]) - points[:, 2]
-        is_inside = (vertical > 0.0) & (vertical <= surface.max_depth)
-        deep = np.flatnonzero(vertical > surface.max_depth)
-        is_inside[deep] = (
-            surface.law.contact.depth(surface.texture, points[deep]) <= surface.max_depth
-        )
-        return np.asarray(is_inside)
+        depth = contact.depth(texture, points)
+        return np.asarray((depth > 0.0) & (depth <= surface.max_depth))
 
+    return contains
+
+
+def _region_by_search(surface: Surface) -> Callable[[FloatArray], NDArray[np.bool_]]:
+    """Return the same where the depth is the distance of the closest point.
+
+    It is at most the depth below the surface, which is looked at first, as it takes no search.
+    """
+    texture = surface.texture
     cores = available_cores()
     pool = ThreadPoolExecutor(cores)
-    return lambda points: np.concatenate([*pool.map(contains, np.array_split(points, cores))])
+
+    def depths(points: FloatArray) -> FloatArray:
+        return surface.law.contact.depth(texture, points)
+
+    def contains(points: FloatArray) -> NDArray[np.bool_]:
+        vertical = texture.height(points[:, :2]) - points[:, 2]
+        is_inside = (vertical > 0.0) & (vertical <= surface.max_depth)
+        deep = np.flatnonzero(vertical > surface.max_depth)
+        depth = np.concatenate([*pool.map(depths, np.array_split(points[deep], cores))])
+        is_inside[deep] = depth <= surface.max_depth
+        return np.asarray(is_inside)
+
+    return contains
 
 
 def search_jumps(cells: int, seconds: float = 10.0) -> None:

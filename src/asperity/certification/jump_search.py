@@ -200,12 +200,14 @@ class JumpSearch:
             segments = _join_segments(self._new)
             self._new = []
             along = np.argmax(np.abs(segments.direction) / cell, axis=1)
+            beside = []
             for shift in (1, 2):
                 offsets = cell * (np.arange(3) == ((along + shift) % 3)[:, None])
                 for sign in (1.0, -1.0):
                     chosen = self._untried(segments, sign * offsets)
-                    beside = segments.select(chosen), sign * offsets[chosen]
-                    self._bisect(self._segments_beside(*beside), gain)
+                    part = segments.select(chosen), sign * offsets[chosen]
+                    beside.append(self._segments_beside(*part))
+            self._bisect(_join_segments(beside), gain)
 
     def _untried(self, segments: _Segments, offsets: FloatArray) -> NDArray[np.bool_]:
         """Return one segment for each cell and axis beside which none was followed yet."""
