@@ -73,7 +73,7 @@ def search_laws(seconds: float, surface_name: str | None = None, laws: str = LAW
 def _search(surface: Surface, seconds: float) -> Certification:
     """Return what is found of a law in its working region.
 
-    A law with memory is compiled from C; D, each of whose forces is a search, runs on all cores.
+    A law with memory is compiled from C; one whose forces are searches runs on all cores.
     """
     renderer: Any = surface.force
     with TemporaryDirectory() as folder:
@@ -83,7 +83,7 @@ def _search(surface: Surface, seconds: float) -> Certification:
             c_programs.run_command(
                 "cc", "-O2", "-shared", "-fPIC", f"{folder}/texture.c", "-lm", "-o", renderer
             )
-        elif surface.law.letter == "D":
+        elif surface.law.contact.has_warm_start:
             Path(f"{folder}/surface.pickle").write_bytes(pickle.dumps(surface))
             renderer = f"{folder}/renderer.py"
             Path(renderer).write_text(_PROGRAM)

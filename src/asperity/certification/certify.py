@@ -47,12 +47,12 @@ DEFAULT_SECONDS = 10.0
 _SHARES = {
     "first gain": 0.1,
     "first jumps": 0.05,
-    "gain": 0.3,
+    "gain": 0.2,
     "jumps": 0.15,
     "one-sided gain": 0.12,
-    "loops": 0.28,
+    "loops": 0.38,
 }
-_SHARE_OF_KNOWN_JUMPS = 1.6
+_SHARE_OF_KNOWN_JUMPS = 2.1
 """Share of the search for more jumps once one is known, in place of the search for the gain."""
 _FIRST_CALLS = 4096
 _COST_CALLS = 10_000

@@ -58,12 +58,19 @@ def find_circulations(calls: RendererCalls, plane: FloatArray, cells: int) -> Fl
     z = np.arange(rows + 1.0)[:, None] / rows * height
     along = corner + x[:-1] + 0.5 / columns * side + z
     up = corner + x + z[:-1] + 0.5 / rows * height
-    work_along = calls.at(along.reshape(-1, 3)).reshape(along.shape) @ side / columns
-    work_up = calls.at(up.reshape(-1, 3)).reshape(up.shape) @ height / rows
-    work = work_along[:, :-1] + work_up[1:] - work_along[:, 1:] - work_up[:-1]
     corners = corner + x + z
     inside = calls.region.contains(corners.reshape(-1, 3)).reshape(columns + 1, rows + 1)
     whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
+    beside = np.pad(whole, 1)
+    is_along = beside[1:-1, :-1] | beside[1:-1, 1:]
+    is_up = beside[:-1, 1:-1] | beside[1:, 1:-1]
+    forces = calls.at(np.concatenate([along[is_along], up[is_up]]))
+    work_along = np.full(is_along.shape, np.nan)
+    work_up = np.full(is_up.shape, np.nan)
+    count = np.count_nonzero(is_along)
+    work_along[is_along] = forces[:count] @ side / columns
+    work_up[is_up] = forces[count:] @ height / rows
+    work = work_along[:, :-1] + work_up[1:] - work_along[:, 1:] - work_up[:-1]
     return np.where(whole, work, np.nan)
 
 

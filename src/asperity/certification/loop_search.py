@@ -150,7 +150,7 @@ class LoopSearch:
         cells = int(min(_COARSE_CELLS, max(6.0, math.sqrt(budget / 200.0))))
         fine_cells = int(min(_FINE_CELLS, max(cells, 0.25 * math.sqrt(budget))))
         count = int(min(_PLANES, max(4.0, 0.05 * budget / cells**2)))
-        planes = self._best_planes(count, cells, now + 0.5 * (deadline - now))
+        planes = self._best_planes(count, cells, now + 0.4 * (deadline - now))
         middle_cells = int(min(_MIDDLE_CELLS, max(cells, 0.1 * math.sqrt(budget))))
         works = [self._best_loop_work(plane, middle_cells) for plane in planes]
         found = 0
