@@ -387,8 +387,8 @@ class _Segments:
         """Magnitudes of the changes of force beyond the trend [N], shape (n,)."""
         return _excess(self.start_force, self.end_force, self.trend * self.lengths[:, None])
 
-    def select(self, chosen: NDArray[np.bool_]) -> _Segments:
-        """Return some of them."""
+    def select(self, chosen: NDArray[np.bool_] | IntArray) -> _Segments:
+        """Return some of them, by a mask or by their indices."""
         return _Segments(*[array[chosen] for array in vars(self).values()])
 
     def halve(self, calls: RendererCalls) -> None:
