@@ -100,6 +100,21 @@ def test_every_set_of_jumps_of_the_god_object_has_a_witness(
     assert len(found_sets(labels, box, places)) == count
 
 
+def test_slopes_that_are_no_jumps_are_kept_for_the_gain() -> None:
+    def force(points: FloatArray) -> FloatArray:
+        # A ramp of a newton over a micrometre.
+        return np.clip(1e6 * points[:, :1], -0.5, 0.5) * [0.0, 0.0, 1.0]
+
+    calls = RendererCalls(FunctionRenderer(force), Region(*np.array([[-1e-3] * 3, [1e-3] * 3])))
+    search = JumpSearch(calls, Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7), seed=0)
+    search.run(0.0, None)
+    assert search.jumps == ()
+    steps = np.diff(search.steepest, axis=1)[:, 0]
+    ends = force(search.steepest.reshape(-1, 3)).reshape(-1, 2, 3)
+    changes = np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)
+    assert np.max(changes / np.linalg.norm(steps, axis=1)) > 0.9e6
+
+
 def planted(library: str, name: str) -> Certification:
     return certify(library, name=name, region=BOX, seconds=3.0)
 

@@ -76,7 +76,7 @@ class JumpSearch:
 
     Attributes:
         jumps: the jumps found, the largest first.
-        steepest: ends of the steepest slope between neighbours [m], shape (2, 3).
+        steepest: ends of the steepest slopes between neighbours [m], shape (n, 2, 3).
     """
 
     def __init__(self, calls: RendererCalls, resolution: Resolution, seed: int) -> None:
@@ -261,6 +261,7 @@ class JumpSearch:
     def _are_left(self, segments: _Segments, changes: list[FloatArray]) -> NDArray[np.bool_]:
         """Return which segments keep their change, the largest of a cell where no jump is known."""
         is_left = changes[-1] > _LEFT * changes[-_TRIED_HALVINGS]
+        self._record_slope(segments, np.where(is_left, 0.0, changes[-1]))
         cells = self._cells(segments.start)
         ends = self._cells(segments.end)
         seen: set[tuple[int, ...]] = set()
@@ -278,9 +279,7 @@ class JumpSearch:
         lengths = segments.lengths
         explained = 3.0 * self.resolution.explained(gain) + 1e-9 * self.calls.largest_force
         is_jump, _exponents = _jumps_among(changes, explained + gain * lengths)
-        steepest = int(np.argmax(np.where(is_jump, 0.0, changes[-1] / lengths)))
-        ends = [segments.start[steepest], segments.end[steepest]]
-        self.steepest = np.concatenate([self.steepest, [ends]])
+        self._record_slope(segments, np.where(is_jump, 0.0, changes[-1]))
         segments = segments.select(is_jump)
         changes = [change[is_jump] for change in changes]
         lengths = lengths[is_jump]
@@ -302,6 +301,13 @@ class JumpSearch:
                 found, over, exponent = [float(row[index]) for row in (size, lengths, exponents)]
                 self._jumps[cells[index]] = ForceJump(at, along, found, over, exponent, approach)
         return segments.select(is_jump & ~is_inside)
+
+    def _record_slope(self, segments: _Segments, changes: FloatArray) -> None:
+        """Keep the segment of the steepest change [N], which is 0 for jumps."""
+        if changes.any():
+            steepest = int(np.argmax(changes / segments.lengths))
+            ends = [segments.start[steepest], segments.end[steepest]]
+            self.steepest = np.concatenate([self.steepest, [ends]])
 
     def _repeated_changes(self, segments: _Segments) -> FloatArray:
         """Return the least change in repetitions [N], since rare noise does not come again."""
