@@ -100,6 +100,23 @@ def test_every_set_of_jumps_of_the_god_object_has_a_witness(
     assert len(found_sets(labels, box, places)) == count
 
 
+@pytest.mark.parametrize("letter", ["A", "D"])
+def test_renderer_is_tried_in_the_region_alone(letter: str) -> None:
+    surface = Surface(Sinusoid(1e-4, 2e-3), letter, stiffness=1000.0, max_depth=4e-4)
+    low = np.array([-0.3e-3, -1e-3, -3e-4])
+    high = np.array([1.7e-3, 1e-3, 5e-5])
+    beyond = [0.0]
+
+    def force(points: FloatArray) -> FloatArray:
+        beyond.append(float(np.max([low - points, points - high])))
+        return surface.force(points)
+
+    result = certify(force, region=np.column_stack([low, high]), seconds=1.0)
+    assert max(beyond) <= 1e-15
+    assert result.largest_at is not None
+    assert (low <= result.largest_at).all()
+
+
 def test_slopes_that_are_no_jumps_are_kept_for_the_gain() -> None:
     def force(points: FloatArray) -> FloatArray:
         # A ramp of a newton over a micrometre.

@@ -140,6 +140,7 @@ class GainSearch:
         steps = np.where(inside, step, -step)
         ends[:, axes, axes] += steps - step
         inside[~inside] = region.contains(ends[~inside])
+        ends[:] = np.where(inside[:, :, None], ends, places[:, :1])
         forces = self.calls.after(places[:, -1], places[:, 0], stencils)
         jacobians = np.swapaxes((forces[:, 1:] - forces[:, :1]) / steps[:, :, None], 1, 2)
         is_valid = np.asarray(inside.all(axis=1) & np.isfinite(jacobians).all(axis=(1, 2)))
@@ -165,10 +166,13 @@ class GainSearch:
         """
         shares = self.resolution.secant / np.sqrt(np.square(ends - starts).sum(axis=1))
         ends = starts + np.maximum(shares, 1.0)[:, None] * (ends - starts)
+        inside = self.calls.region.contains(starts) & self.calls.region.contains(ends)
+        if not inside.any():
+            return
+        starts, ends, places = [array[inside] for array in (starts, ends, places)]
         steps = ends - starts
         lengths = np.sqrt(np.square(steps).sum(axis=1))
-        region = self.calls.region
-        gains = np.where(region.contains(starts) & region.contains(ends), np.inf, 0.0)
+        gains = np.full(len(steps), np.inf)
         paths = approach_paths(places[:, -1], starts, ends)
         for _ in range(2):
             changes, sizes = step_changes(self.calls.along(paths))

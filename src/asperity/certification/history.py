@@ -64,7 +64,8 @@ def find_history(
     scale = 10.0 ** random.uniform(-4.0, -0.3, (_APPROACHES, len(points), 1))
     directions = random.normal(size=(_APPROACHES, len(points), 3))
     directions[::2, :, 2] = 0.0  # a proxy on a surface moves along it
-    starts = points + scale * directions * calls.region.size
+    region = calls.region
+    starts = np.clip(points + scale * directions * region.size, region.low, region.high)
     starts[0] = points
     threshold = resolution.force_error + 1e-9 * calls.largest_force
     spreads = _measure_spreads(calls, starts, points)

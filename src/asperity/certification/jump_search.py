@@ -28,7 +28,7 @@ _LARGEST_BATCH = 2**16
 """Samples of a line at least, and of all lines that are searched at once."""
 _SAMPLES_PER_CANDIDATE = 20
 _SHORTEST = 1e-9
-_JUMP_EXPONENT = 0.2
+_JUMP_EXPONENT = 0.1
 _HALVINGS = 4
 _TRIED_HALVINGS = 5
 _REPEATS = 3
@@ -226,8 +226,12 @@ class JumpSearch:
         reach = (_TILT * spread + _LEAST_REACH * self.calls.region.size) * segments.direction
         chosen = self._is_unknown(middle)
         chosen[chosen] = self.calls.region.contains(middle[chosen])
-        ends = (segments.approach, middle - reach, middle + reach, segments.trend)
-        return _find_segments(self.calls, *[array[chosen] for array in ends])
+        ends = self._within_box(middle - reach), self._within_box(middle + reach)
+        arrays = (segments.approach, *ends, segments.trend)
+        return _find_segments(self.calls, *[array[chosen] for array in arrays])
+
+    def _within_box(self, points: FloatArray) -> FloatArray:
+        return np.clip(points, self.calls.region.low, self.calls.region.high)
 
     def _bent_samples(self, lines: FloatArray, forces: FloatArray) -> tuple[IntArray, IntArray]:
         """Return lines and first samples where the force bends most, and no jump is known."""

@@ -103,10 +103,13 @@ def _position_steps(
     """
     least = max(noise, _ROUNDING * calls.largest_force)
     steps = np.zeros(3)
+    region = calls.region
     for axis in range(3):
-        for span in _SPANS[calls.region.size[axis] >= _SPANS]:
+        for span in _SPANS[region.size[axis] >= _SPANS]:
             lines = np.repeat(places[:, None], _SAMPLES, axis=1)
-            lines[..., axis] += np.linspace(-0.5 * span, 0.5 * span, _SAMPLES)
+            first = np.minimum(places[:, axis] - 0.5 * span, region.high[axis] - span)
+            first = np.maximum(first, region.low[axis])
+            lines[..., axis] = first[:, None] + np.linspace(0.0, span, _SAMPLES)
             forces = calls.at(lines.reshape(-1, 3)).reshape(lines.shape)
             changes = np.asarray((np.abs(np.diff(forces, axis=1)) > least).any(axis=2))
             counts = changes.sum(axis=1)
@@ -123,7 +126,10 @@ def _position_steps(
 
 def _typical_gain(calls: RendererCalls, places: FloatArray) -> float:
     """Return the median of the secants of 1 % of the region [N/m]."""
-    length = 0.01 * float(calls.region.size.max())
-    change = calls.at(places + np.array([0.0, 0.0, length])) - calls.at(places)
+    region = calls.region
+    length = min(0.01 * float(region.size.max()), 0.5 * float(region.size[2]))
+    ends = places.copy()
+    ends[:, 2] += np.where(places[:, 2] + length <= region.high[2], length, -length)
+    change = calls.at(ends) - calls.at(places)
     gains = np.sqrt(np.square(change).sum(axis=1)) / length
     return float(np.nanmedian(gains)) if len(gains) else 0.0
