@@ -147,7 +147,7 @@ class LoopSearch:
         """Find planes of much circulation on a coarse grid, and their loops on finer ones."""
         now = time.monotonic()
         budget = self.calls.rate * max(deadline - now, 0.0)
-        cells = int(min(_COARSE_CELLS, max(6.0, math.sqrt(budget / 200.0))))
+        cells = int(min(_COARSE_CELLS, max(6.0, math.sqrt(budget / 1600.0))))
         fine_cells = int(min(_FINE_CELLS, max(cells, 0.25 * math.sqrt(budget))))
         count = int(min(_PLANES, max(4.0, 0.05 * budget / cells**2)))
         planes = self._best_planes(count, cells, now + 0.4 * (deadline - now))
