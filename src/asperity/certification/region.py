@@ -149,7 +149,7 @@ class RendererCalls:
         return self.at(curves.reshape(-1, 3)).reshape(curves.shape)
 
     def inside_on_curves(self, curves: FloatArray) -> FloatArray:
-        """Return forces on curves as above; NaN outside of the region."""
+        """Return forces on curves in the region, NaN elsewhere; see ``on_curves``."""
         inside = self.region.contains(curves.reshape(-1, 3)).reshape(curves.shape[:2])
         if self.approaches:
             return np.where(inside[:, :, None], self.along(curves), np.nan)

@@ -125,7 +125,7 @@ def _position_steps(
 
 
 def _typical_gain(calls: RendererCalls, places: FloatArray) -> float:
-    """Return the median of the secants of 1 % of the region [N/m]."""
+    """Return the median of the secants of 1 % of the region, or half its height [N/m]."""
     region = calls.region
     length = min(0.01 * float(region.size.max()), 0.5 * float(region.size[2]))
     ends = places.copy()
