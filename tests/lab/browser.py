@@ -123,7 +123,7 @@ class Browser:
     def let_drawings_settle(self) -> None:
         """Wait until relief and section are painted in the size of their places, which stay."""
         self.until(
-            "lab.hasCurrentPictures && [lab.relief, lab.section].every(({ scaledCanvas: s }) => "
+            "[lab.relief, lab.section].every(({ scaledCanvas: s }) => "
             "!s.needsRepaint && Math.abs(s.width * s.unit - s.element.clientWidth) < 1"
             " && Math.abs(s.height * s.unit - s.element.clientHeight) < 1)"
         )

@@ -104,6 +104,7 @@ def test_the_relief_is_the_surface(page: Browser, dark: bool) -> None:
     # Painted in the colours of the day or of the night, and on the screen.
     low = "getComputedStyle(document.documentElement).getPropertyValue('--low').trim()"
     page.until(f"lab.relief.paintKey === {low}")
+    page.until("lab.hasCurrentPictures")
     got = shown(page, "relief")
     high, wide = got.shape[:2]
     differs = {}
@@ -121,6 +122,7 @@ def test_the_relief_is_the_surface(page: Browser, dark: bool) -> None:
 @needs_browser
 def test_the_cut_is_the_surface_under_the_probe(page: Browser) -> None:
     page.resize(1280, 900)
+    page.until("lab.hasCurrentPictures")
     got, ink = shown(page, "section"), colour(page, "ink")
     high, wide = got.shape[:2]
     left, right, bottom, top = page.ask("lab.section.box")
