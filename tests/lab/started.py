@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 
 LAB = (sys.executable, "-m", "asperity", "lab", "--no-browser")
 _FAST = """from asperity.__main__ import main
@@ -55,6 +57,14 @@ class Started:
     @property
     def host(self) -> str:
         return self.address.split("/")[2]
+
+    def children(self) -> list[int]:
+        """Return the processes that it has started, among them that of the loop."""
+        children = ""
+        for task in Path(f"/proc/{self.process.pid}/task").iterdir():
+            with suppress(FileNotFoundError):  # a thread that ended meanwhile
+                children += (task / "children").read_text()
+        return [int(child) for child in children.split()]
 
     def end(self) -> tuple[int, str]:
         """End it as Ctrl-C does; exit code, and what else it said."""

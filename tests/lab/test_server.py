@@ -185,10 +185,8 @@ def test_pictures_are_computed_elsewhere(lab: Started) -> None:
 
 def niced(lab: Started) -> list[int]:
     """Return the processes that make pictures and limits: they stand back behind the loop."""
-    tasks = Path(f"/proc/{lab.process.pid}/task").iterdir()
-    children = [int(one) for task in tasks for one in (task / "children").read_text().split()]
     least = os.getpriority(os.PRIO_PROCESS, lab.process.pid)
-    return [one for one in children if os.getpriority(os.PRIO_PROCESS, one) > least]
+    return [one for one in lab.children() if os.getpriority(os.PRIO_PROCESS, one) > least]
 
 
 def test_pictures_come_again_when_their_process_was_killed(lab: Started) -> None:

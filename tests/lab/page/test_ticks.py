@@ -6,16 +6,9 @@ import os
 import re
 import signal
 import time
-from pathlib import Path
 
 from tests.lab.browser import Browser, needs_browser
 from tests.lab.started import Started
-
-
-def children(lab: Started) -> list[int]:
-    """Return the processes that the lab has started, among them that of the loop."""
-    tasks = Path(f"/proc/{lab.process.pid}/task").iterdir()
-    return [int(one) for task in tasks for one in (task / "children").read_text().split()]
 
 
 @needs_browser
@@ -23,10 +16,10 @@ def test_a_suspended_loop_is_counted_as_late_ticks(page: Browser, lab: Started) 
     page.until("lab.status.state === 'running'")
     before = page.ask("[lab.frame.late, lab.frame.skipped]")
     for _ in range(5):  # the lab resumes a suspended loop within some ten milliseconds
-        for one in children(lab):
+        for one in lab.children():
             os.kill(one, signal.SIGSTOP)
         time.sleep(0.1)
-        for one in children(lab):
+        for one in lab.children():
             os.kill(one, signal.SIGCONT)
     page.until(f"lab.frame.late > {before[0]} && lab.frame.skipped > {before[1]} + 5")
     assert page.ask("lab.frame.lateness") > 3e-3
