@@ -214,8 +214,13 @@ class Run:
                 self.loop = log.process or (loops[0] if loops else 0)
                 return
             time.sleep(0.02)
-        error = LateStartError if b"late for too long" in self.said else AssertionError
+        error = LateStartError if self.was_late else AssertionError
         raise error(f"no force: {self.said.decode(errors='replace')[-500:]}")
+
+    @property
+    def was_late(self) -> bool:
+        """Whether the loop has said that it ended because it was late."""
+        return b"late for too long" in self.said
 
     def drain(self) -> None:
         """Read what the command printed, so that it can print more."""
