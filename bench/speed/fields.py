@@ -15,7 +15,7 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Texture
 from asperity.textures.catalogue import as_texture
 from asperity.textures.fields.field_grid import FieldGrid
-from asperity.textures.fields.node_potentials import split_columns
+from asperity.textures.fields.node_potentials import lattice_columns, split_columns
 from asperity.textures.fields.potential_field import PotentialField
 from bench.speed import cases, ticks
 from bench.speed.timing import number_table, take_turns
@@ -84,7 +84,7 @@ def print_nodes(console: Console) -> None:
         xy = texture.domain.points(np.random.default_rng(1).uniform(size=(NODE_COLUMNS, 2)))
         z = grid.height(np.arange(grid.levels, dtype=float))
         depths = np.empty((2, NODE_COLUMNS, grid.levels))
-        searches = [split_columns(texture, 1.0), split_columns(texture, 1.0, grid)]
+        searches = [split_columns(texture, 1.0), lattice_columns(texture, 1.0, grid)[0]]
         batches = [
             partial(search, xy, z, grid.margin, out)
             for search, out in zip(searches, depths, strict=True)

@@ -134,17 +134,18 @@ class Texture(Plottable, ABC):
         self,
         spacing: tuple[float, ...],  # noqa: ARG002 - for kinds that have a lattice
         z: FloatArray,  # noqa: ARG002 - likewise
-    ) -> tuple[tuple[ModuleType, ...], tuple[Any, ...]]:
-        """Return modules that replace the closest-point search by a quick one, and their record.
+    ) -> tuple[tuple[ModuleType, ...], list[tuple[Any, ...]]]:
+        """Return modules that replace the closest-point search by a quick one, and their records.
 
         A quick search starts from a lattice and proves nothing: its point is one of the surface
-        and mostly the closest. By default the search is that of the sampler.
+        and mostly the closest. With each further record it is slower and misses fewer. By default
+        the search is that of the sampler.
 
         Args:
             spacing: distance of the places where it is used along each axis of the plane [m].
             z: of the levels of the lattice, rising [m].
         """
-        return (), self.arguments
+        return (), [self.arguments]
 
     @cached_property
     @abstractmethod

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
+from asperity.core.processes import run_in_threads
 from asperity.core.units import round_up
 from asperity.laws import LAWS
 from asperity.laws.clamps import NONE
@@ -29,6 +31,7 @@ _STALLED = 0.8
 DEPTHS = 12
 PRESSES = 16
 PROBES = 256
+_PROBES_AT_ONCE = 64
 # Mean force over stiffness from which on differences count [m]: 0.1 N on a stiff device.
 LIGHT_TOUCH = 0.1 / 3000.0
 LEAST_DEPTH = 0.03
@@ -158,7 +161,7 @@ class BakePlan:
             rows: index of the depth of each.
             depths: [m]; those at which hardly any force is felt are omitted, but for the last.
         """
-        force = self.exact(points)[0]
+        force = self.exact_force(points)
         felt = _mean_of_rows(np.linalg.norm(force, axis=1), rows, len(depths)) >= LIGHT_TOUCH
         felt[-1] = True
         self.depths = depths[felt]
@@ -176,21 +179,40 @@ class BakePlan:
     def set_shallow(self, points: FloatArray) -> None:
         """Set the points [m], (n, 3), just below the surface at which its place is measured."""
         self.shallow = points
-        self.shallow_depth = self.exact(points)[1]
+        self.shallow_depth = self.exact_depth(points)
 
-    def exact(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the exact force over the stiffness [m], (n, 3), and depth √(2U) [m], (n,)."""
-        return self._render(self.texture, points)
+    def exact_force(self, points: FloatArray) -> FloatArray:
+        """Return the exact force over the stiffness [m], (n, 3)."""
+        return self._render_force(self.texture, points)
 
-    def _render(self, texture: Texture, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def exact_depth(self, points: FloatArray) -> FloatArray:
+        """Return the exact depth √(2U) [m], (n,)."""
+        return self._render_depth(self.texture, points)
+
+    def _render_force(self, texture: Texture, points: FloatArray) -> FloatArray:
+        loops = self._loops(texture)
+        force = np.empty(points.shape)
+
+        def render(part: slice) -> None:
+            loops.force_batch(points[part], force[part], texture.arguments, self._law_arguments)
+
+        run_in_threads(render, _slices(len(points)), None)
+        return force
+
+    def _render_depth(self, texture: Texture, points: FloatArray) -> FloatArray:
+        loops = self._loops(texture)
+        split = np.empty(points.shape)
+
+        def render(part: slice) -> None:
+            loops.split_batch(points[part], split[part], self.continuity, texture.arguments)
+
+        run_in_threads(render, _slices(len(points)), None)
+        return np.sqrt(np.maximum(2.0 * split[:, 0], 0.0))
+
+    def _loops(self, texture: Texture) -> Any:
         from asperity.kernels.fuse import fuse_surface
 
-        loops = fuse_surface(LAWS["H"], texture.sampler, NONE)
-        force = np.empty(points.shape)
-        split = np.empty(points.shape)
-        loops.force_batch(points, force, texture.arguments, self._law_arguments)
-        loops.split_batch(points, split, self.continuity, texture.arguments)
-        return force, np.sqrt(np.maximum(2.0 * split[:, 0], 0.0))
+        return fuse_surface(LAWS["H"], texture.sampler, NONE)
 
     def grid(self, resolution: float) -> FieldGrid:
         """Return the coarsest grid of a resolution [m]."""
@@ -214,9 +236,10 @@ class BakePlan:
         """Return the field of a resolution [m], whose gain is not certified yet."""
         grid = self.grid(resolution)
         self.check_size(grid)
-        columns = node_potentials.split_columns(self.texture, self.continuity, grid)
+        quick, *repairs = node_potentials.lattice_columns(self.texture, self.continuity, grid)
+        repairs.append(self.columns)
         potentials = node_potentials.compute_potentials(
-            columns, grid, progress, exact=self.columns, continuity=self.continuity
+            quick, grid, progress, repairs=repairs, continuity=self.continuity
         )
         return self.measure(potentials, grid)
 
@@ -320,8 +343,8 @@ class BakePlan:
             one_sided=_UNKNOWN_GAIN,
             accuracy=FieldAccuracy(force, energy),
         )
-        difference = self._render(field, self.probes)[0] - self.force
-        shift = np.abs(self._render(field, self.shallow)[1] - self.shallow_depth)
+        difference = self._render_force(field, self.probes) - self.force
+        shift = np.abs(self._render_depth(field, self.shallow) - self.shallow_depth)
         field.accuracy = replace(
             field.accuracy,
             rms=float(np.sqrt(np.square(difference).sum(axis=1).mean())),
@@ -364,6 +387,11 @@ def _between(resolution: float, limits: list[float], ends: tuple[float, float]) 
         return resolution
     limit = lower if resolution <= lower else upper
     return limit if limit in ends else math.sqrt(lower * upper)
+
+
+def _slices(count: int) -> list[slice]:
+    """Return slices of a number of probes for threads."""
+    return [slice(k, k + _PROBES_AT_ONCE) for k in range(0, count, _PROBES_AT_ONCE)]
 
 
 def _mean_of_rows(values: FloatArray, rows: NDArray[np.intp], count: int) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -23,6 +23,7 @@ from asperity.textures.texture import Texture
 
 _NODES_PER_BLOCK = 10_000
 _MAX_REPLACEMENTS = 10
+_REPAIRS_AT_ONCE = 64
 # Part of a second derivative of 1 that is left to rounding.
 _TOLERANCE = 0.01
 # Step of the levels of a lattice where cells are equally high, and the number of those below all.
@@ -36,27 +37,28 @@ _MODES: Any = {PERIODIC: "wrap", MIRRORED: "mirror", ZERO: "nearest"}
 ColumnFunction = Callable[[FloatArray, FloatArray, float, FloatArray], object]
 
 
-def split_columns(
-    texture: Texture, continuity: float, grid: FieldGrid | None = None
-) -> ColumnFunction:
-    """Return the function of the depth of law H of a texture.
+def split_columns(texture: Texture, continuity: float) -> ColumnFunction:
+    """Return the function of the exact depth of law H of a texture."""
+    return _column_function(texture, continuity, (), texture.arguments)
 
-    It is exact; for the nodes of a grid it is that of close points where the texture finds them
-    from a lattice, in a fraction of the time: see :meth:`Texture.closest_lattice`.
+
+def lattice_columns(texture: Texture, continuity: float, grid: FieldGrid) -> list[ColumnFunction]:
+    """Return functions of the depth of law H of a texture at the nodes of a grid.
+
+    It is that of close points where the texture finds them from a lattice, in a fraction of the
+    time of the exact one: see :meth:`Texture.closest_lattice`. The first function is the quickest,
+    each further one misses fewer closest points.
     """
-    overrides: tuple[ModuleType, ...] = ()
-    arguments = texture.arguments
-    if grid is not None:
-        levels = np.arange(grid.levels)
-        z = grid.height(levels)
-        used = (levels < grid.stretched) | (levels % _LATTICE_STEP == 0)
-        # The probe of law H's search is below the node by its depth over c.
-        depth = texture.extremes[1] - z[0]
-        deepest = depth * (1.0 + 1.0 / max(continuity, 0.5))
-        below = texture.extremes[1] - np.geomspace(deepest, depth, _LEVELS_BELOW, endpoint=False)
-        lattice_z = np.concatenate([below, z[used]])
-        overrides, arguments = texture.closest_lattice(grid.spacing[:-1], lattice_z)
-    return _column_function(texture, continuity, overrides, arguments)
+    levels = np.arange(grid.levels)
+    z = grid.height(levels)
+    used = (levels < grid.stretched) | (levels % _LATTICE_STEP == 0)
+    # The probe of law H's search is below the node by its depth over c.
+    depth = texture.extremes[1] - z[0]
+    deepest = depth * (1.0 + 1.0 / max(continuity, 0.5))
+    below = texture.extremes[1] - np.geomspace(deepest, depth, _LEVELS_BELOW, endpoint=False)
+    lattice_z = np.concatenate([below, z[used]])
+    overrides, records = texture.closest_lattice(grid.spacing[:-1], lattice_z)
+    return [_column_function(texture, continuity, overrides, record) for record in records]
 
 
 def _column_function(
@@ -73,7 +75,7 @@ def compute_potentials(
     grid: FieldGrid,
     progress: Progress | None = None,
     *,
-    exact: ColumnFunction | None = None,
+    repairs: Sequence[ColumnFunction] = (),
     continuity: float = 1.0,
 ) -> SingleArray:
     """Return the depth less the offset of the level [m] at the nodes, in single precision.
@@ -84,8 +86,8 @@ def compute_potentials(
         columns: the depth at columns of nodes.
         grid: the nodes.
         progress: called with the finished fraction.
-        exact: likewise, exact, where ``columns`` may be too deep: it is used at nodes around which
-            the depth is not that of law H.
+        repairs: likewise, where ``columns`` may be too deep: they are used one after the other at
+            nodes around which the depth is not that of law H, the last one is exact.
         continuity: c of law H.
     """
     *plane, levels = grid.node_counts
@@ -102,8 +104,8 @@ def compute_potentials(
         depths[first : first + at_once] = block - offsets
 
     run_in_threads(fill, range(0, count, at_once), progress)
-    if exact is not None:
-        _replace_wrong(depths, exact, grid, continuity)
+    for repair in repairs:
+        _replace_wrong(depths, repair, grid, continuity)
     return depths.reshape(grid.node_counts)
 
 
@@ -114,7 +116,7 @@ def _plane_positions(grid: FieldGrid, columns: NDArray[np.intp]) -> FloatArray:
 
 
 def _replace_wrong(
-    depths: SingleArray, exact: ColumnFunction, grid: FieldGrid, continuity: float
+    depths: SingleArray, repair: ColumnFunction, grid: FieldGrid, continuity: float
 ) -> None:
     """Replace depths at nodes, (columns, levels) [m], around which they are not those of law H.
 
@@ -124,19 +126,29 @@ def _replace_wrong(
     for trial in range(_MAX_REPLACEMENTS):
         wrong = np.empty(depths.shape, bool)
         for level in range(grid.levels):
-            wrong[:, level] = _wrong_at_level(depths, grid, continuity, level, 2**trial)
+            kept = replaced[:, level]
+            wrong[:, level] = _wrong_at_level(depths, kept, grid, continuity, level, 2**trial)
         wrong &= ~replaced
         replaced |= wrong
-        columns = np.flatnonzero(wrong.any(axis=1)).tolist()
-        if not columns:
+        columns = np.flatnonzero(wrong.any(axis=1))
+        if not len(columns):
             return
-        run_in_threads(partial(_replace_column, depths, exact, grid, wrong), columns, None)
+        parts = np.split(columns, range(_REPAIRS_AT_ONCE, len(columns), _REPAIRS_AT_ONCE))
+        run_in_threads(partial(_replace_columns, depths, repair, grid, wrong), parts, None)
 
 
 def _wrong_at_level(
-    depths: SingleArray, grid: FieldGrid, continuity: float, level: int, size: int
+    depths: SingleArray,
+    replaced: NDArray[np.bool_],
+    grid: FieldGrid,
+    continuity: float,
+    level: int,
+    size: int,
 ) -> NDArray[np.bool_]:
-    """Return the nodes of a level, by columns, less than a number of steps from a wrong one."""
+    """Return the nodes of a level, by columns, less than ``size`` steps from a wrong one.
+
+    Nodes that were replaced before do not count as wrong.
+    """
     from scipy import ndimage
 
     stored = depths[:, level].astype(float)
@@ -144,22 +156,27 @@ def _wrong_at_level(
     rounding = 2.0 * float(np.finfo(np.float32).eps * np.abs(stored).max() * np.abs(whole).max())
     plane = whole.reshape(*grid.node_counts[:-1], 1)
     marks = wrong_nodes(plane, grid, continuity, rounding)[..., 0]
+    marks &= ~replaced.reshape(marks.shape)
     mode = _MODES[grid.border]
     return np.asarray(ndimage.maximum_filter(marks, 2 * size - 1, mode=mode)).ravel()
 
 
-def _replace_column(
+def _replace_columns(
     depths: SingleArray,
-    exact: ColumnFunction,
+    repair: ColumnFunction,
     grid: FieldGrid,
     wrong: NDArray[np.bool_],
-    column: int,
+    columns: NDArray[np.intp],
 ) -> None:
-    """Replace the wrong depths of a column, which is given by its number."""
-    levels = np.flatnonzero(wrong[column])
-    found = np.empty((1, len(levels)))
-    exact(_plane_positions(grid, np.array([column])), grid.height(levels), grid.margin, found)
-    depths[column, levels] = found[0] - grid.offsets()[levels]
+    """Replace the wrong depths of columns, which are given by their numbers."""
+    offsets = grid.offsets()
+    z = grid.height(np.arange(grid.levels))
+    xy = _plane_positions(grid, columns)
+    for k, column in enumerate(columns.tolist()):
+        levels = np.flatnonzero(wrong[column])
+        found = np.empty((1, len(levels)))
+        repair(xy[k : k + 1], z[levels], grid.margin, found)
+        depths[column, levels] = found[0] - offsets[levels]
 
 
 def wrong_nodes(

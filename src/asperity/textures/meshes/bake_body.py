@@ -277,17 +277,21 @@ class _BodyPlan(bake.BakePlan):
         depths = max_depth * np.geomspace(bake.LEAST_DEPTH, 1.0, bake.DEPTHS)
         rows = np.repeat(np.arange(bake.DEPTHS), bake.PROBES)
         points = self.loops.surface_probes(depths[rows])
-        inside = self.exact(points)[1] > 0.0
+        inside = self.exact_depth(points) > 0.0
         if not inside.any():
             raise ParameterError("max_depth", "finds no point inside the body", max_depth)
         self.set_probes(points[inside], rows[inside], depths)
         points = self.loops.surface_probes(np.full(bake.PROBES, bake.SHALLOW * max_depth))
-        self.set_shallow(points[self.exact(points)[1] > 0.0])
+        self.set_shallow(points[self.exact_depth(points) > 0.0])
 
-    def exact(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def exact_force(self, points: FloatArray) -> FloatArray:
         """See :class:`BakePlan`."""
-        potential, *force, _depth = self.loops.evaluate(points).T
-        return np.stack(force, axis=1), np.sqrt(np.maximum(2.0 * potential, 0.0))
+        return self.loops.evaluate(points)[:, 1:4]
+
+    def exact_depth(self, points: FloatArray) -> FloatArray:
+        """See :class:`BakePlan`."""
+        potential = self.loops.evaluate(points)[:, 0]
+        return np.sqrt(np.maximum(2.0 * potential, 0.0))
 
     def trial(self, resolution: float, progress: Progress | None) -> PotentialField:
         """See :class:`BakePlan`."""

@@ -4,7 +4,8 @@ A lattice holds heights of the surface at nodes. For each place, every few nodes
 holds the node of the surface nearest to it: the lower envelope of the parabolas
 |X - x|² + max(h - z, 0)², first along the rows and then along the columns, in linear time [1]. The
 closest point of a probe is then found by descents from the best of the nodes stored around it, and
-from others apart from it. It is always a point of the surface, and mostly the closest one.
+from others apart from it, of which a thorough search tries more. It is always a point of the
+surface, and mostly the closest one.
 
 [1] P. F. Felzenszwalb, D. P. Huttenlocher. Distance transforms of sampled functions. Theory of
 Computing 8 (2012), 415-428.
@@ -24,12 +25,11 @@ KERNELS = Kernels(loops=("nearest_nodes",), provides=("closest_point_within_budg
 
 # Places on either side of a probe above the surface that may be near its closest point.
 OUTSIDE_PLACES = 3
-# Greatest number of descents for a probe inside, and the distance of their starts [nodes] from
-# earlier starts and from what these led to.
-MAX_DESCENTS = 3
+# Distance of the starts of descents [nodes] from earlier starts and from what these led to.
 CLEAR = 2.0
-# How much farther away than the first the other starts may be [nodes].
-SLACK = 1.0
+MOST_DESCENTS = 8
+# How much farther away than the first the starts of a thorough search may be [nodes].
+THOROUGH_SLACK = 2.0
 
 
 class LatticeArguments(NamedTuple):
@@ -45,6 +45,9 @@ class LatticeArguments(NamedTuple):
         stride: the places are every so many nodes along each axis.
         side_x: distance of the nodes [m].
         side_y: likewise; that of a profile is positive, too.
+        beyond: how many places beyond those around a probe inside are looked at.
+        descents: greatest number of descents for such a probe, at most MOST_DESCENTS.
+        slack: how much farther away than the first the other starts may be [nodes].
     """
 
     c: FloatArray
@@ -63,6 +66,9 @@ class LatticeArguments(NamedTuple):
     stride: int
     side_x: float
     side_y: float
+    beyond: int = 0
+    descents: int = 3
+    slack: float = 1.0
 
 
 def nearest_nodes(
@@ -165,11 +171,11 @@ def closest_point_within_budget(
         start_x, start_y = nearest_outside(x, y, z, start_x, start_y, square, texture)
         best, left = descend_within_budget(x, y, z, start_x, start_y, budget, texture)
         return best[0], best[1], best[3], best[4], best[5], 0.0, budget - left
-    tried = local_array((6, 2))
+    tried = local_array((16, 2))
     left = budget
     best = (start_x, start_y, np.inf, height, 0.0, 0.0)
     limit = square
-    for descent in range(MAX_DESCENTS):
+    for descent in range(texture.descents):
         count = 2 * descent
         from_x, from_y, other = nearest_stored(
             x, y, z, start_x, start_y, limit, tried, count, texture
@@ -185,7 +191,7 @@ def closest_point_within_budget(
             best = found
         if descent == 0:
             # A point in another basin may be closer if its node is not much farther.
-            limit = (math.sqrt(other) + SLACK * max(texture.side_x, texture.side_y)) ** 2
+            limit = (math.sqrt(other) + texture.slack * max(texture.side_x, texture.side_y)) ** 2
     return best[0], best[1], best[3], best[4], best[5], 0.0, budget - left
 
 
@@ -210,9 +216,10 @@ def nearest_stored(
     j = node_below((x - texture.first_x) / (texture.side_x * texture.stride), places_x)
     i = node_below((y - texture.first_y) / (texture.side_y * texture.stride), places_y)
     m = level_below(z, texture.z)
-    for level in range(m, min(m + 2, texture.nearest.shape[0])):
-        for row in range(i, min(i + 2, places_y)):
-            for column in range(j, min(j + 2, places_x)):
+    beyond = texture.beyond
+    for level in range(max(m - beyond, 0), min(m + 2 + beyond, texture.nearest.shape[0])):
+        for row in range(max(i - beyond, 0), min(i + 2 + beyond, places_y)):
+            for column in range(max(j - beyond, 0), min(j + 2 + beyond, places_x)):
                 node = texture.nearest[level, row, column]
                 node_row = node // columns
                 node_column = node - node_row * columns

@@ -142,12 +142,16 @@ class Spline(Texture):
 
     def closest_lattice(
         self, spacing: tuple[float, ...], z: FloatArray
-    ) -> tuple[tuple[ModuleType, ...], tuple[Any, ...]]:
+    ) -> tuple[tuple[ModuleType, ...], list[tuple[Any, ...]]]:
         """See :class:`Texture`."""
-        from asperity.textures.spline import lattice_search
+        from asperity.textures.spline import lattice_search as search
         from asperity.textures.spline.pyramid import build_lattice
 
-        return (lattice_search,), build_lattice(self, self._pitches, spacing, z)
+        quick = build_lattice(self, self._pitches, spacing, z)
+        thorough = quick._replace(
+            beyond=1, descents=search.MOST_DESCENTS, slack=search.THOROUGH_SLACK
+        )
+        return (search,), [quick, thorough]
 
     @property
     def _sides(self) -> tuple[float, ...]:
