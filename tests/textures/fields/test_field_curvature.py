@@ -103,12 +103,12 @@ def test_cells_found_at_their_corners_have_one_above_the_limit(axes: int, border
     """Above the floor exactly these are found, and no cell that is proved to be below the limit."""
     grid, depth = random_grid(axes, border)
     field = grid.arguments(depth, 3.9)
-    limit = 0.5 * (1.0 + bounds_of(field, 0, 4 + (border == MIRRORED))[:, 0].max())
+    limit = 0.8 * bounds_of(field, 0, 4 + (border == MIRRORED))[:, 1].max()
     every = np.ones(grid.node_counts, np.uint8)
     marks = cells_above(field, limit, every, at_corners=True)
     proved = cells_above(field, limit, every)
+    assert marks.any()
     assert not (marks & ~proved).any()
-    assert 0 < np.count_nonzero(marks) < np.count_nonzero(proved)
     sides = np.stack(np.meshgrid(*[[-0.5, 0.5]] * (axes + 1), indexing="ij"), axis=-1)
     corners = (1.0 - 1e-7) * sides.reshape(-1, axes + 1)
     for cell in np.ndindex(*grid.cells, grid.levels - 1):

@@ -123,13 +123,15 @@ def _replace_wrong(
     Where nodes beside replaced ones are found wrong, too, ever more around them are replaced.
     """
     replaced = np.zeros(depths.shape, bool)
+    changed = np.arange(grid.levels)
     for trial in range(_MAX_REPLACEMENTS):
-        wrong = np.empty(depths.shape, bool)
-        for level in range(grid.levels):
+        wrong = np.zeros(depths.shape, bool)
+        for level in changed.tolist():
             kept = replaced[:, level]
             wrong[:, level] = _wrong_at_level(depths, kept, grid, continuity, level, 2**trial)
         wrong &= ~replaced
         replaced |= wrong
+        changed = np.flatnonzero(wrong.any(axis=0))
         columns = np.flatnonzero(wrong.any(axis=1))
         if not len(columns):
             return
@@ -224,6 +226,8 @@ def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> 
         mode = _MODES[grid.border if axis < depths.ndim - 1 else ZERO]
         planes = np.moveaxis(depths, other, 0), np.moveaxis(weights, other, 0)
         for plane, shares in zip(*planes, strict=True):
+            if not shares.any():
+                continue
             change = ndimage.correlate1d(plane, [1.0, -2.0, 1.0], axis - (axis > other), mode=mode)
             if axis == depths.ndim - 1:
                 change[..., 0] = 0.0
