@@ -121,7 +121,7 @@ class GainSearch:
             return points
         scales = 10.0 ** self._random.uniform(-3.0, -0.5, (len(points), 1, 1))
         starts = points + scales * region.size * self._random.normal(size=points.shape)
-        return np.concatenate([points, np.clip(starts, region.low, region.high)], axis=1)
+        return np.concatenate([points, region.clip(starts)], axis=1)
 
     def _values(self, places: FloatArray) -> FloatArray:
         """Return the measure of the Jacobians at places, -1 where they do not exist."""

@@ -65,7 +65,7 @@ def find_history(
     directions = random.normal(size=(_APPROACHES, len(points), 3))
     directions[::2, :, 2] = 0.0  # a proxy on a surface moves along it
     region = calls.region
-    starts = np.clip(points + scale * directions * region.size, region.low, region.high)
+    starts = region.clip(points + scale * directions * region.size)
     starts[0] = points
     threshold = resolution.force_error + 1e-9 * calls.largest_force
     spreads = _measure_spreads(calls, starts, points)

@@ -226,12 +226,9 @@ class JumpSearch:
         reach = (_TILT * spread + _LEAST_REACH * self.calls.region.size) * segments.direction
         chosen = self._is_unknown(middle)
         chosen[chosen] = self.calls.region.contains(middle[chosen])
-        ends = self._within_box(middle - reach), self._within_box(middle + reach)
+        ends = self.calls.region.clip(middle - reach), self.calls.region.clip(middle + reach)
         arrays = (segments.approach, *ends, segments.trend)
         return _find_segments(self.calls, *[array[chosen] for array in arrays])
-
-    def _within_box(self, points: FloatArray) -> FloatArray:
-        return np.clip(points, self.calls.region.low, self.calls.region.high)
 
     def _bent_samples(self, lines: FloatArray, forces: FloatArray) -> tuple[IntArray, IntArray]:
         """Return lines and first samples where the force bends most, and no jump is known."""

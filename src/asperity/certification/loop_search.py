@@ -177,7 +177,7 @@ class LoopSearch:
         ends, energies = climb(
             random_ends(region, count, self._random),
             lambda ends: self._plane_energies(vertical_planes(region, ends), cells),
-            lambda _starts, ends: np.clip(ends, region.low, region.high),
+            lambda _starts, ends: region.clip(ends),
             partial(_is_past, deadline),
             self._random,
             _FIRST_SPREAD * region.size,

@@ -61,6 +61,10 @@ class Region:
         """Return the points at fractions of the box, shape (n, 3)."""
         return self.low + fractions * self.size
 
+    def clip(self, points: FloatArray) -> FloatArray:
+        """Return the points of the box closest to points [m], shape (..., 3) both."""
+        return np.clip(points, self.low, self.high)
+
     def lowest_points(self, points: FloatArray) -> FloatArray:
         """Return the lowest points of the region above points [m], shape (n, 3) both."""
         columns = np.repeat(points[:, None], _LEVELS, axis=1)
@@ -76,7 +80,7 @@ class Region:
             starts: points of the region, shape (..., 3).
             ends: as many.
         """
-        limited = np.clip(ends, self.low, self.high).reshape(-1, 3)
+        limited = self.clip(ends).reshape(-1, 3)
         beyond = np.flatnonzero(~self.contains(limited))
         inside = starts.reshape(-1, 3)[beyond]
         outside = limited[beyond]

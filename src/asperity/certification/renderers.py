@@ -328,8 +328,8 @@ class LibraryRenderer(LocalRenderer):
     def _address(self, name: str) -> int:
         if not self._has_function(name):
             raise RendererError(
-                f"{self._library._name} has no function {self._prefix}_{name}; "
-                "the prefix of its functions is the argument name"
+                f"{self._library._name} has no function {self._prefix}_{name}: the functions of"
+                f" a renderer begin with its name, here {self._prefix}"
             )
         function = getattr(self._library, f"{self._prefix}_{name}")
         return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
