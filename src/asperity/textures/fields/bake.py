@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -190,24 +191,13 @@ class BakePlan:
         return self._render_depth(self.texture, points)
 
     def _render_force(self, texture: Texture, points: FloatArray) -> FloatArray:
-        loops = self._loops(texture)
-        force = np.empty(points.shape)
-
-        def render(part: slice) -> None:
-            loops.force_batch(points[part], force[part], texture.arguments, self._law_arguments)
-
-        run_in_threads(render, _slices(len(points)), None)
-        return force
+        loop = self._loops(texture).force_batch
+        return _evaluate(loop, points, texture.arguments, self._law_arguments)
 
     def _render_depth(self, texture: Texture, points: FloatArray) -> FloatArray:
-        loops = self._loops(texture)
-        split = np.empty(points.shape)
-
-        def render(part: slice) -> None:
-            loops.split_batch(points[part], split[part], self.continuity, texture.arguments)
-
-        run_in_threads(render, _slices(len(points)), None)
-        return np.sqrt(np.maximum(2.0 * split[:, 0], 0.0))
+        loop = self._loops(texture).split_batch
+        potential = _evaluate(loop, points, self.continuity, texture.arguments)[:, 0]
+        return np.sqrt(np.maximum(2.0 * potential, 0.0))
 
     def _loops(self, texture: Texture) -> Any:
         from asperity.kernels.fuse import fuse_surface
@@ -413,9 +403,12 @@ def _between(resolution: float, limits: list[float], ends: tuple[float, float]) 
     return limit if limit in ends else math.sqrt(lower * upper)
 
 
-def _slices(count: int) -> list[slice]:
-    """Return slices of a number of probes for threads."""
-    return [slice(k, k + _PROBES_AT_ONCE) for k in range(0, count, _PROBES_AT_ONCE)]
+def _evaluate(loop: Callable[..., None], points: FloatArray, *arguments: Any) -> FloatArray:
+    """Return the numbers (n, 3) that a compiled loop writes at points (n, 3), in threads."""
+    numbers = np.empty(points.shape)
+    parts = [slice(k, k + _PROBES_AT_ONCE) for k in range(0, len(points), _PROBES_AT_ONCE)]
+    run_in_threads(lambda part: loop(points[part], numbers[part], *arguments), parts, None)
+    return numbers
 
 
 def _mean_of_rows(values: FloatArray, rows: NDArray[np.intp], count: int) -> FloatArray:

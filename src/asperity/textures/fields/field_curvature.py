@@ -249,40 +249,15 @@ def multiply_hull(
             product[n, 6] += w * s * hull[j, 3, k]
 
 
-def has_corner_above(k: int, size: int, hull: FloatArray, bounds: FloatArray) -> bool:
-    """Return whether an eigenvalue of Hess T or its negative is above its bound at a corner."""
-    for q in range(size):
-        s = hull[q, 0, k]
-        if s <= 0.0 or not is_corner(q):
-            continue
-        x = hull[q, 1, k]
-        y = hull[q, 2, k]
-        z = hull[q, 3, k]
-        xx = s * hull[q, 4, k] + x * x
-        xy = s * hull[q, 5, k] + x * y
-        xz = s * hull[q, 6, k] + x * z
-        yy = s * hull[q, 7, k] + y * y
-        yz = s * hull[q, 8, k] + y * z
-        zz = s * hull[q, 9, k] + z * z
-        upper = least_minor(bounds[0, 0], xx, xy, xz, yy, yz, zz)
-        lower = least_minor(bounds[1, 0], -xx, -xy, -xz, -yy, -yz, -zz)
-        if min(upper, lower) < -MINOR_ROUNDING:
-            return True
-    return False
-
-
-def keep_high_corners(
-    place: tuple[int, int, int],
-    count: int,
-    hull: FloatArray,
-    bounds: FloatArray,
-    work: FloatArray,
-    marks: NDArray[np.uint8],
-    size: int,
+def measure_corners(
+    count: int, hull: FloatArray, bounds: FloatArray, work: FloatArray, size: int
 ) -> None:
-    """Keep the marks of the cells of a run at whose corners an eigenvalue is above its bound."""
+    """Write to row 5 of ``work`` what is negative for cells with a corner above a bound.
+
+    It is the least leading minor of the bounds less the eigenvalues of Hess T and its negative.
+    """
     for k in range(count):
-        work[3, k] = 0.0
+        work[5, k] = 0.0
     for q in range(size):
         if not is_corner(q):
             continue
@@ -299,11 +274,8 @@ def keep_high_corners(
             zz = s * hull[q, 9, k] + z * z
             upper = least_minor(bounds[0, 0], xx, xy, xz, yy, yz, zz)
             lower = least_minor(bounds[1, 0], -xx, -xy, -xz, -yy, -yz, -zz)
-            least = min(work[3, k], upper, lower)
-            work[3, k] = least if s > 0.0 else work[3, k]
-    for k in range(count):
-        if work[3, k] >= -MINOR_ROUNDING:
-            marks[place[0], place[1], place[2] + k] = 0
+            least = min(work[5, k], upper, lower)
+            work[5, k] = least if s > 0.0 else work[5, k]
 
 
 def raise_bound(
@@ -360,9 +332,9 @@ def raise_bound(
 
 
 def search_run(
-    place: tuple[int, int, int],
-    count: int,
+    run: tuple[int, int, int, int],
     rate: float,
+    is_quick: bool,
     hull: FloatArray,
     work: FloatArray,
     pairs: IntArray,
@@ -372,23 +344,36 @@ def search_run(
     marks: NDArray[np.uint8],
     field: FieldArguments,
 ) -> None:
-    """Raise the bounds by the cells of a run that are not excluded, or test these cells."""
+    """Raise the bounds by the cells of a run that are not excluded, or test these cells.
+
+    A run is the place of its first cell and the number of cells; quickly tested at corners only.
+    """
+    j, i, m, count = run
+    size = pairs.shape[0]
+    tests = marks.shape[0] > 0
+    if tests:
+        measure_corners(count, hull, bounds, work, size)
+    if is_quick:
+        for k in range(count):
+            if work[5, k] >= -MINOR_ROUNDING:
+                marks[j, i, m + k] = 0
+        return
+    measure_hulls(count, hull, work, size)
+    exclude_cells(m, count, rate, hull, bounds, work, size, field)
     upper = bounds[0, 0]
     lower = bounds[1, 0]
-    tests = marks.shape[0] > 0
     for k in range(count):
-        if tests and marks[place[0], place[1], place[2] + k] == 0:
+        if tests and marks[j, i, m + k] == 0:
             continue
         is_open = not work[3, k] > MINOR_ROUNDING
-        is_above = tests and is_open and rate == 0.0
-        is_above = is_above and has_corner_above(k, pairs.shape[0], hull, bounds)
+        is_above = tests and is_open and rate == 0.0 and work[5, k] < -MINOR_ROUNDING
         if is_open and not is_above:
             multiply_hull(k, hull, pairs, weights, product)
             for row in range(2):
-                raise_bound(row, place, k, rate, hull, product, bounds, field)
+                raise_bound(row, (j, i, m), k, rate, hull, product, bounds, field)
         if tests:
             is_above |= bounds[0, 0] > upper or bounds[1, 0] > lower
-            marks[place[0], place[1], place[2] + k] = 1 if is_above else 0
+            marks[j, i, m + k] = 1 if is_above else 0
             bounds[0, 0] = upper
             bounds[1, 0] = lower
 
@@ -423,10 +408,9 @@ def hull_batch(
         field: the field.
     """
     rows = min(field_rows(field), 3)
-    size = pairs.shape[0]
     nodes = local_array((9, 34))
     mixed = local_array((6, 34))
-    work = local_array((5, 32))
+    work = local_array((6, 32))
     hull = local_array((27, 10, 32))
     product = local_array((125, 7))
     lines = max(field_rows(field) - 3 + int(field.border != PERIODIC), 1)
@@ -446,16 +430,20 @@ def hull_batch(
                     m += count
                     continue
                 load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
-                place = (j, i, m)
-                if at_corners and above:
-                    expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull, 2)
-                    keep_high_corners(place, count, hull, bounds, work, marks, size)
-                    m += count
-                    continue
-                expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull, 1)
-                measure_hulls(count, hull, work, size)
-                exclude_cells(m, count, rate, hull, bounds, work, size, field)
+                is_quick = at_corners and above
+                step = 2 if is_quick else 1
+                expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull, step)
                 search_run(
-                    place, count, rate, hull, work, pairs, weights, product, bounds, marks, field
+                    (j, i, m, count),
+                    rate,
+                    is_quick,
+                    hull,
+                    work,
+                    pairs,
+                    weights,
+                    product,
+                    bounds,
+                    marks,
+                    field,
                 )
                 m += count

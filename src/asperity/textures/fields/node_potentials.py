@@ -127,8 +127,9 @@ def _replace_wrong(
     for trial in range(_MAX_REPLACEMENTS):
         wrong = np.zeros(depths.shape, bool)
         for level in changed.tolist():
-            kept = replaced[:, level]
-            wrong[:, level] = _wrong_at_level(depths, kept, grid, continuity, level, 2**trial)
+            wrong[:, level] = _wrong_at_level(
+                depths, replaced[:, level], grid, continuity, level, 2**trial
+            )
         wrong &= ~replaced
         replaced |= wrong
         changed = np.flatnonzero(wrong.any(axis=0))
