@@ -31,7 +31,7 @@ def random_grid(axes: int, border: int, noise: float = 0.1) -> tuple[FieldGrid, 
 def bounds_of(field: FieldArguments, first: int = 0, last: int = 4) -> FloatArray:
     found = np.zeros((2, 5))
     weights = *hull_weights(field), *product_weights(field)
-    hull.hull_batch(first, last, *weights, found, NO_MARKS, False, field)
+    hull.hull_batch(first, last, *weights, found, NO_MARKS, field)
     return found
 
 
@@ -95,31 +95,6 @@ def test_cells_above_a_limit_are_those_that_may_exceed_it(axes: int, border: int
     some = (RNG.uniform(size=every.shape) < 0.5).astype(np.uint8)
     np.testing.assert_array_equal(cells_above(field, limit, some), marks & some)
     np.testing.assert_array_equal(cells_above(field, 1e3, every), 0)
-
-
-@pytest.mark.parametrize("border", [PERIODIC, MIRRORED])
-@pytest.mark.parametrize("axes", [1, 2])
-def test_cells_found_at_their_corners_have_one_above_the_limit(axes: int, border: int) -> None:
-    """Above the floor exactly these are found, and no cell that is proved to be below the limit."""
-    grid, depth = random_grid(axes, border)
-    field = grid.arguments(depth, 3.9)
-    limit = 0.8 * bounds_of(field, 0, 4 + (border == MIRRORED))[:, 1].max()
-    every = np.ones(grid.node_counts, np.uint8)
-    marks = cells_above(field, limit, every, at_corners=True)
-    proved = cells_above(field, limit, every)
-    assert marks.any()
-    assert not (marks & ~proved).any()
-    sides = np.stack(np.meshgrid(*[[-0.5, 0.5]] * (axes + 1), indexing="ij"), axis=-1)
-    corners = (1.0 - 1e-7) * sides.reshape(-1, axes + 1)
-    for cell in np.ndindex(*grid.cells, grid.levels - 1):
-        if cell[-1] <= grid.below:
-            continue
-        places = np.array(cell) + corners
-        xy = grid.positions(places[:, :axes])
-        points = np.column_stack([xy, grid.height(places[:, -1])])
-        eigenvalues = np.linalg.eigvalsh(hessians(field, points))
-        exceeds = np.maximum(eigenvalues[:, -1], -eigenvalues[:, 0]).max() > limit
-        assert bool(marks[cell]) == exceeds, cell
 
 
 def test_cells_outside_of_the_body_and_of_other_columns_are_skipped() -> None:

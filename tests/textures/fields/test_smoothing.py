@@ -69,9 +69,9 @@ def test_weights_fall_slowly_from_marked_nodes(border: int) -> None:
     assert (cells[..., 1:-1][near[..., 1:-1]] > 0).all()
 
 
-def smoothed_field(name: str, passes: int, max_gain: float = 0.5) -> PotentialField:
-    """Return a field that is smoothed so often; the default gain cannot be reached."""
-    goal = BakeGoal(max_gain=max_gain)
+def smoothed_field(name: str, passes: int) -> PotentialField:
+    """Return a field that is smoothed so often: the gain asked for is one that cannot be."""
+    goal = BakeGoal(max_gain=0.5)
     assert goal.passes >= passes
     texture = TEXTURES[name]
 
@@ -80,7 +80,7 @@ def smoothed_field(name: str, passes: int, max_gain: float = 0.5) -> PotentialFi
         def passes(self) -> int:
             return passes
 
-    return bake_texture(texture, DEPTH, resolution=2.5e-5, goal=Fixed(max_gain=max_gain))
+    return bake_texture(texture, DEPTH, resolution=2.5e-5, goal=Fixed(max_gain=0.5))
 
 
 @pytest.mark.parametrize("name", TEXTURES)
@@ -128,6 +128,6 @@ def test_smoothing_stops_at_the_gain_asked_for() -> None:
     passes = {gain: field.passes for gain, field in fields.items()}
     assert passes[None] == passes[2.0] == 0 < passes[1.2]
     assert fields[1.2].gain.upper <= 1.2 < fields[None].gain.upper
-    fewer = smoothed_field("map", passes[1.2] - 1, 1.2)
+    fewer = smoothed_field("map", passes[1.2] - 1)
     assert fewer.gain.upper > 1.2
     assert "smoothed" in fields[1.2].preparation[-1]

@@ -20,7 +20,7 @@ from asperity.textures.fields import node_potentials
 from asperity.textures.fields.field_bricks import BRICK_BYTES
 from asperity.textures.fields.field_certificate import Progress, cells_above, certify_gain
 from asperity.textures.fields.field_grid import RAMP, FieldGrid, SingleArray
-from asperity.textures.fields.field_record import largest_coefficient, largest_step
+from asperity.textures.fields.field_record import FieldArguments, largest_coefficient, largest_step
 from asperity.textures.fields.potential_field import FieldAccuracy, PotentialField
 from asperity.textures.texture import CertifiedNumber, Texture
 
@@ -234,13 +234,7 @@ class BakePlan:
         return self.measure(potentials, grid)
 
     def certify(self, field: PotentialField, progress: Progress | None) -> PotentialField:
-        """Smooth the last field until its gain is proved to reach the goal, and certify it.
-
-        Returns:
-            The field.
-        """
-        if field.passes < self.goal.passes:
-            self._smooth(field, is_proved=True)
+        """Set the certified gain of a field, and return it."""
         field.gain, field.one_sided = certify_gain(field.grid, field.arguments, progress)
         return field
 
@@ -257,23 +251,22 @@ class BakePlan:
         last = resolution, np.ones(2)
         for trial in range(_MAX_TRIALS):
             done = 1.0 - 0.5**trial
-            left = 1.0 - done
-            field = self.trial(resolution, scale_progress(progress, done, 0.5 * left))
+            field = self.trial(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
             errors = self.relative_errors(field.accuracy)
-            if _is_final(errors, resolution, limits) or trial == _MAX_TRIALS - 1:
-                self.certify(field, scale_progress(progress, done + 0.5 * left, 0.5 * left))
-                errors = self.relative_errors(field.accuracy)
-                if _is_final(errors, resolution, limits):
-                    break
-            limits[bool(errors.max() > 1.0)] = resolution
+            is_reached = bool(errors.max() <= 1.0)
+            if resolution == limits[is_reached] or 0.5 <= errors.max() <= 1.0:
+                break
+            limits[not is_reached] = resolution
             if trial:
                 rise = np.log(errors / last[1]) / math.log(resolution / last[0])
                 powers = np.clip(rise, *_POWER_RANGE)
             last = resolution, errors
             resolution *= float(((_AIM / errors) ** (1.0 / powers)).min())
             resolution = _between(resolution, limits, (finest, coarsest))
-        if resolution == finest and errors.max() > 1.0:
+        if resolution == finest and not is_reached:
             field.accuracy = replace(field.accuracy, is_limited=True)
+        left = 0.5 ** (trial + 1)
+        self.certify(field, scale_progress(progress, 1.0 - left, left))
         return field
 
     def relative_errors(self, accuracy: FieldAccuracy) -> FloatArray:
@@ -316,68 +309,34 @@ class BakePlan:
             raise ParameterError("resolution", excess, max(grid.spacing))
 
     def measure(self, potentials: SingleArray, grid: FieldGrid) -> PotentialField:
-        """Return the field, smoothed until no gain found is above the goal, and its accuracy.
+        """Return the field, smoothed until its gain reaches the goal, and its accuracy.
 
         Args:
-            potentials: at the nodes of the grid; they are smoothed, too.
+            potentials: at the nodes of the grid.
             grid: the nodes.
         """
-        self.potentials = potentials
+        is_large = potentials.nbytes > BRICK_BYTES
+        limit = self.goal.max_gain * self.gain - _GAIN_OF_ROUNDING * is_large
+        arguments, passes = self._smooth(potentials, grid, limit)
+        if is_large:
+            arguments = grid.to_bricks(potentials, arguments)
+        sizes = largest_coefficient(arguments), largest_step(arguments)
+        force, energy = grid.error_bounds(self.lipschitz, passes, *sizes)
         field = PotentialField(
             self.texture,
             grid,
-            grid.arguments(potentials, self.lift),
+            arguments,
             max_depth=self.max_depth,
             continuity=self.continuity,
-            passes=0,
+            passes=passes,
             gain=_UNKNOWN_GAIN,
             one_sided=_UNKNOWN_GAIN,
-            accuracy=FieldAccuracy(math.inf, math.inf),
+            accuracy=FieldAccuracy(force, energy),
         )
-        self._smooth(field, is_proved=False)
-        return field
-
-    def _smooth(self, field: PotentialField, *, is_proved: bool) -> None:
-        """Smooth the last potentials until no gain is above the goal, and measure their field.
-
-        Args:
-            field: the field, whose coefficients, passes and accuracy are set.
-            is_proved: whether no gain is known to be above, instead of none at a corner of a cell.
-        """
-        grid = field.grid
-        potentials = self.potentials
-        is_large = potentials.nbytes > BRICK_BYTES
-        limit = self.goal.max_gain * self.gain - _GAIN_OF_ROUNDING * is_large
-        before = np.inf
-        ramp = RAMP
-        cells = np.ones(grid.node_counts, np.uint8)
-        while True:
-            arguments = grid.arguments(potentials, self.lift)
-            cells = cells_above(arguments, limit, cells, at_corners=not is_proved)
-            count = int(np.count_nonzero(cells))
-            if field.passes == self.goal.passes or count == 0:
-                break
-            # What is left is due to the borders of smoothed parts: they are widened.
-            if count > _STALLED * before:
-                ramp = 2 * ramp + 1
-            before = count
-            weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
-            node_potentials.smooth(potentials, weights, grid)
-            field.passes += 1
-        if is_large:
-            arguments = grid.to_bricks(potentials, arguments)
-        field.set_arguments(arguments)
-        self._measure_accuracy(field)
-
-    def _measure_accuracy(self, field: PotentialField) -> None:
-        """Set the accuracy of a field."""
-        sizes = largest_coefficient(field.arguments), largest_step(field.arguments)
-        force, energy = field.grid.error_bounds(self.lipschitz, field.passes, *sizes)
         difference = self._render_force(field, self.probes) - self.force
         shift = np.abs(self._render_depth(field, self.shallow) - self.shallow_depth)
-        field.accuracy = FieldAccuracy(
-            force,
-            energy,
+        field.accuracy = replace(
+            field.accuracy,
             rms=float(np.sqrt(np.square(difference).sum(axis=1).mean())),
             largest=float(np.linalg.norm(difference, axis=1).max()),
             depths=tuple(self.depths.tolist()),
@@ -386,12 +345,29 @@ class BakePlan:
             onset=float(shift.max()),
             onset_places=len(shift),
         )
+        return field
 
-
-def _is_final(errors: FloatArray, resolution: float, limits: list[float]) -> bool:
-    """Return whether errors over the goal are close to it, or nothing is beyond the resolution."""
-    worst = float(errors.max())
-    return resolution == limits[worst <= 1.0] or 0.5 <= worst <= 1.0
+    def _smooth(
+        self, potentials: SingleArray, grid: FieldGrid, limit: float
+    ) -> tuple[FieldArguments, int]:
+        """Smooth potentials until no gain is above a limit; return the field and the passes."""
+        passes = 0
+        before = np.inf
+        ramp = RAMP
+        cells = np.ones(grid.node_counts, np.uint8)
+        while True:
+            arguments = grid.arguments(potentials, self.lift)
+            cells = cells_above(arguments, limit, cells)
+            count = int(np.count_nonzero(cells))
+            if passes == self.goal.passes or count == 0:
+                return arguments, passes
+            # What is left is due to the borders of smoothed parts: they are widened.
+            if count > _STALLED * before:
+                ramp = 2 * ramp + 1
+            before = count
+            weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
+            node_potentials.smooth(potentials, weights, grid)
+            passes += 1
 
 
 def _between(resolution: float, limits: list[float], ends: tuple[float, float]) -> float:

@@ -58,7 +58,7 @@ def curvature_bounds(
     bounds = np.zeros((2, 5))
     if grid.border != ZERO:
         bounds[0, :2] = 1.0  # of the flat wall far below
-    numbers = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, False, progress)
+    numbers = _search(bounds, np.zeros((0, 0, 0), np.uint8), field, progress)
     largest = largest_coefficient(field) + float(
         field.stretched_cells[:, OFFSETS:].max(initial=0.0)
     )
@@ -84,32 +84,19 @@ def _certified_number(upper: float, attained: list[float]) -> CertifiedNumber:
     return CertifiedNumber(value, upper, (x, y, z))
 
 
-def cells_above(
-    field: FieldArguments, limit: float, cells: NDArray[np.uint8], *, at_corners: bool = False
-) -> NDArray[np.uint8]:
+def cells_above(field: FieldArguments, limit: float, cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return those of the cells, not 0, in which an eigenvalue may be above the limit.
 
     A cell is named by the node in its middle; the shape is that of the nodes.
-
-    Args:
-        field: the coefficients.
-        limit: of the eigenvalues of Hess T and of -Hess T.
-        cells: the cells to test.
-        at_corners: whether they are tested at their corners only, in a third of the time: nothing
-            is proved of those that are not returned.
     """
     marks = cells.copy()
     whole = marks if field_rows(field) > 1 else marks[:, None]
-    _search(np.full((2, 5), limit), whole, field, at_corners, None)
+    _search(np.full((2, 5), limit), whole, field, None)
     return marks
 
 
 def _search(
-    bounds: FloatArray,
-    marks: NDArray[np.uint8],
-    field: FieldArguments,
-    at_corners: bool,
-    progress: Progress | None,
+    bounds: FloatArray, marks: NDArray[np.uint8], field: FieldArguments, progress: Progress | None
 ) -> FloatArray:
     """Return the bounds of each part of the search, (n, 2, 5)."""
     from asperity.kernels.fuse import fuse_module
@@ -123,7 +110,7 @@ def _search(
     def search(part: int) -> None:
         # Starting from the bounds of the first part, the others evaluate few cells.
         numbers[part] = numbers[0]
-        loops.hull_batch(*parts[part], *weights, numbers[part], marks, at_corners, field)
+        loops.hull_batch(*parts[part], *weights, numbers[part], marks, field)
 
     run_in_threads(search, range(len(parts)), progress)
     return numbers

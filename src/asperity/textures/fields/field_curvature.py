@@ -70,11 +70,6 @@ def least_minor(
     return min(a, middle, c * middle - a * yz * yz - b * xz * xz - 2.0 * xy * xz * yz)
 
 
-def is_corner(q: int) -> bool:
-    """Return whether a Bernstein coefficient of degree 2 is at a corner of the cell."""
-    return q % 3 != 1 and q // 3 % 3 != 1 and q // 9 != 1
-
-
 def load_nodes(
     i: int, j: int, m: int, count: int, rows: int, nodes: FloatArray, field: FieldArguments
 ) -> None:
@@ -107,20 +102,16 @@ def expand_run(
     mixed: FloatArray,
     margin: float,
     hull: FloatArray,
-    step: int,
 ) -> None:
     """Write the Bernstein coefficients of S, ∇S and Hess S of a run of cells from level m on.
 
-    ``hull`` (27, 10, count) holds S, x, y, z, xx, xy, xz, yy, yz, zz; with a step of 2 instead of 1
-    only those at the corners of the cells are written.
+    ``hull`` (27, 10, count) holds S, x, y, z, xx, xy, xz, yy, yz, zz.
     """
     sources = (5, 3, 4, 5, 0, 1, 3, 2, 4, 5)  # mixture of columns, and derivative along z
     orders = (0, 0, 0, 1, 0, 0, 1, 0, 1, 2)
     for n in range(plane.shape[0]):
-        if step == 2 and not is_corner(3 * n):
-            continue
         mix_nodes(nodes, count + 2, n, plane, mixed)
-        for g in range(0, 3, step):
+        for g in range(3):
             q = 3 * n + g
             for t in range(10):
                 source = sources[t]
@@ -249,33 +240,26 @@ def multiply_hull(
             product[n, 6] += w * s * hull[j, 3, k]
 
 
-def measure_corners(
-    count: int, hull: FloatArray, bounds: FloatArray, work: FloatArray, size: int
-) -> None:
-    """Write to row 5 of ``work`` what is negative for cells with a corner above a bound.
-
-    It is the least leading minor of the bounds less the eigenvalues of Hess T and its negative.
-    """
-    for k in range(count):
-        work[5, k] = 0.0
+def has_corner_above(k: int, size: int, hull: FloatArray, bounds: FloatArray) -> bool:
+    """Return whether an eigenvalue of Hess T or its negative is above its bound at a corner."""
     for q in range(size):
-        if not is_corner(q):
+        s = hull[q, 0, k]
+        if q % 3 == 1 or q // 3 % 3 == 1 or q // 9 == 1 or s <= 0.0:
             continue
-        for k in range(count):
-            s = hull[q, 0, k]
-            x = hull[q, 1, k]
-            y = hull[q, 2, k]
-            z = hull[q, 3, k]
-            xx = s * hull[q, 4, k] + x * x
-            xy = s * hull[q, 5, k] + x * y
-            xz = s * hull[q, 6, k] + x * z
-            yy = s * hull[q, 7, k] + y * y
-            yz = s * hull[q, 8, k] + y * z
-            zz = s * hull[q, 9, k] + z * z
-            upper = least_minor(bounds[0, 0], xx, xy, xz, yy, yz, zz)
-            lower = least_minor(bounds[1, 0], -xx, -xy, -xz, -yy, -yz, -zz)
-            least = min(work[5, k], upper, lower)
-            work[5, k] = least if s > 0.0 else work[5, k]
+        x = hull[q, 1, k]
+        y = hull[q, 2, k]
+        z = hull[q, 3, k]
+        xx = s * hull[q, 4, k] + x * x
+        xy = s * hull[q, 5, k] + x * y
+        xz = s * hull[q, 6, k] + x * z
+        yy = s * hull[q, 7, k] + y * y
+        yz = s * hull[q, 8, k] + y * z
+        zz = s * hull[q, 9, k] + z * z
+        upper = least_minor(bounds[0, 0], xx, xy, xz, yy, yz, zz)
+        lower = least_minor(bounds[1, 0], -xx, -xy, -xz, -yy, -yz, -zz)
+        if min(upper, lower) < -MINOR_ROUNDING:
+            return True
+    return False
 
 
 def raise_bound(
@@ -332,9 +316,9 @@ def raise_bound(
 
 
 def search_run(
-    run: tuple[int, int, int, int],
+    place: tuple[int, int, int],
+    count: int,
     rate: float,
-    is_quick: bool,
     hull: FloatArray,
     work: FloatArray,
     pairs: IntArray,
@@ -344,36 +328,23 @@ def search_run(
     marks: NDArray[np.uint8],
     field: FieldArguments,
 ) -> None:
-    """Raise the bounds by the cells of a run that are not excluded, or test these cells.
-
-    A run is the place of its first cell and the number of cells; quickly tested at corners only.
-    """
-    j, i, m, count = run
-    size = pairs.shape[0]
-    tests = marks.shape[0] > 0
-    if tests:
-        measure_corners(count, hull, bounds, work, size)
-    if is_quick:
-        for k in range(count):
-            if work[5, k] >= -MINOR_ROUNDING:
-                marks[j, i, m + k] = 0
-        return
-    measure_hulls(count, hull, work, size)
-    exclude_cells(m, count, rate, hull, bounds, work, size, field)
+    """Raise the bounds by the cells of a run that are not excluded, or test these cells."""
     upper = bounds[0, 0]
     lower = bounds[1, 0]
+    tests = marks.shape[0] > 0
     for k in range(count):
-        if tests and marks[j, i, m + k] == 0:
+        if tests and marks[place[0], place[1], place[2] + k] == 0:
             continue
         is_open = not work[3, k] > MINOR_ROUNDING
-        is_above = tests and is_open and rate == 0.0 and work[5, k] < -MINOR_ROUNDING
+        is_above = tests and is_open and rate == 0.0
+        is_above = is_above and has_corner_above(k, pairs.shape[0], hull, bounds)
         if is_open and not is_above:
             multiply_hull(k, hull, pairs, weights, product)
             for row in range(2):
-                raise_bound(row, (j, i, m), k, rate, hull, product, bounds, field)
+                raise_bound(row, place, k, rate, hull, product, bounds, field)
         if tests:
             is_above |= bounds[0, 0] > upper or bounds[1, 0] > lower
-            marks[j, i, m + k] = 1 if is_above else 0
+            marks[place[0], place[1], place[2] + k] = 1 if is_above else 0
             bounds[0, 0] = upper
             bounds[1, 0] = lower
 
@@ -387,7 +358,6 @@ def hull_batch(
     weights: FloatArray,
     bounds: FloatArray,
     marks: NDArray[np.uint8],
-    at_corners: bool,
     field: FieldArguments,
 ) -> None:
     """Raise bounds of the eigenvalues of Hess T by the cells of nodes first to last along x.
@@ -403,14 +373,13 @@ def hull_batch(
             the greatest value attained at a corner, and that corner in nodes along the axes.
         marks: cells to test, not 0: left so if their bounds are above those given, which then do
             not change; shape of the nodes, those along x first, or empty to search the bounds.
-        at_corners: whether cells above the floor are tested at their corners only, which proves
-            nothing of the others and takes a third of the time.
         field: the field.
     """
     rows = min(field_rows(field), 3)
+    size = pairs.shape[0]
     nodes = local_array((9, 34))
     mixed = local_array((6, 34))
-    work = local_array((6, 32))
+    work = local_array((5, 32))
     hull = local_array((27, 10, 32))
     product = local_array((125, 7))
     lines = max(field_rows(field) - 3 + int(field.border != PERIODIC), 1)
@@ -430,20 +399,11 @@ def hull_batch(
                     m += count
                     continue
                 load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
-                is_quick = at_corners and above
-                step = 2 if is_quick else 1
-                expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull, step)
+                expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull)
+                measure_hulls(count, hull, work, size)
+                exclude_cells(m, count, rate, hull, bounds, work, size, field)
+                place = (j, i, m)
                 search_run(
-                    (j, i, m, count),
-                    rate,
-                    is_quick,
-                    hull,
-                    work,
-                    pairs,
-                    weights,
-                    product,
-                    bounds,
-                    marks,
-                    field,
+                    place, count, rate, hull, work, pairs, weights, product, bounds, marks, field
                 )
                 m += count

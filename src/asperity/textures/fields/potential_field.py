@@ -154,10 +154,6 @@ class PotentialField(Texture, Tabular):
         self.accuracy = accuracy
         self.filled_mask = source.filled_mask
         self.history = source.history
-        self.set_arguments(arguments)
-
-    def set_arguments(self, arguments: FieldArguments) -> None:
-        """Set the coefficients, while the field is baked."""
         vars(self)["arguments"] = arguments
 
     def __setstate__(self, state: dict[str, Any]) -> None:
