@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,8 @@ from asperity.core.checks import FloatArray
 from asperity.kernels.fuse import fuse_surface
 from asperity.laws import LAWS
 from asperity.laws.clamps import NONE
+from asperity.textures.fields import node_potentials
+from asperity.textures.fields.bake import BakeGoal, BakePlan
 from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.node_potentials import (
     compute_potentials,
@@ -162,3 +166,18 @@ def test_nodes_of_wrong_depth_are_found_and_replaced(name: str) -> None:
     assert (spoilt != exact).mean() > 0.004
     found = compute_potentials(disturbed, grid, repairs=[columns])
     np.testing.assert_allclose(found, exact, atol=1e-10)
+
+
+def test_fields_are_repaired_with_proof_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = BakePlan(TEXTURES["ridges"], DEPTH, 1.0, BakeGoal(max_gain=math.inf))
+    monkeypatch.setattr(node_potentials, "lattice_columns", lambda *_: [plan.columns])
+    wanted = plan.trial(MARGIN / 3.0, None).accuracy
+
+    def disturbed(xy: FloatArray, z: FloatArray, margin: float, out: np.ndarray) -> None:
+        plan.columns(xy, z, margin, out)
+        out[(np.arange(out.size) % 97 == 5).reshape(out.shape) & (out > MARGIN)] += MARGIN / 6.0
+
+    monkeypatch.setattr(node_potentials, "lattice_columns", lambda *_: [disturbed])
+    found = plan.trial(MARGIN / 3.0, None).accuracy
+    assert found.largest == pytest.approx(wanted.largest, rel=1e-5)
+    assert found.rms == pytest.approx(wanted.rms, rel=1e-5)
