@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,16 +32,15 @@ class Cluster:
     """A scheduler and workers, each a process of its own; a context manager."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.stack, self.workers = folder, ExitStack(), list[subprocess.Popen[bytes]]()
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.address = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
+        self.folder = folder
+        self.stack = ExitStack()
+        self.workers = list[subprocess.Popen[bytes]]()
 
     def __enter__(self) -> Cluster:
-        port = self.address.rpartition(":")[2]
-        self.scheduler = self._start(
-            "dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"
-        )
+        contact = self.folder / "scheduler.json"
+        place = ("--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(contact))
+        self.scheduler = self._start("dask_scheduler", *place, "--no-dashboard")
+        self.address = self._read_address(contact)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -55,6 +54,15 @@ class Cluster:
         """Wait for a number of workers."""
         with distributed.Client(self.address, timeout=60, set_as_default=False) as client:
             client.wait_for_workers(count, timeout=60)
+
+    def _read_address(self, contact: Path) -> str:
+        """The address at which the scheduler listens, once it has written it."""
+        for _ in range(1200):
+            with suppress(OSError, json.JSONDecodeError):
+                return str(json.loads(contact.read_text())["address"])
+            assert self.scheduler.poll() is None, "the scheduler ended"
+            time.sleep(0.05)
+        raise AssertionError("the scheduler wrote no address within a minute")
 
     def _start(self, module: str, *arguments: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments]
