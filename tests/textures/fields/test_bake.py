@@ -115,26 +115,55 @@ def test_smoothing_is_widened_where_it_no_longer_lowers_the_gain(
 
 
 @pytest.mark.parametrize(
-    ("power", "factor", "rest", "trials"),
-    [(1.25, 5.0, 0.0, 2), (1.8, 5.0, 0.0, 3), (2.6, 5.0, 0.0, 3), (1.0, 4.0, 0.4, 4)],
+    ("power", "factor", "rest", "smoothing", "trials"),
+    [
+        (1.25, 5.0, 0.0, 1.5, 2),
+        (1.8, 5.0, 0.0, 1.1, 2),
+        (2.6, 5.0, 0.0, 1.0, 2),
+        (0.6, 5.0, 0.0, 1.2, 2),
+        (1.0, 4.0, 0.4, 1.2, 2),
+        (1.0, 0.01, 0.0, 1.2, 2),
+    ],
 )
-def test_search_ends_after_few_trials_where_errors_follow_a_power(
-    power: float, factor: float, rest: float, trials: int, monkeypatch: pytest.MonkeyPatch
+def test_search_ends_with_the_second_trial_where_smoothing_adds_the_same(
+    power: float,
+    factor: float,
+    rest: float,
+    smoothing: float,
+    trials: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also where the growth of cells leaves an error at every resolution."""
     plan, tried = BakePlan(WAVE, 4e-4, 1.0, BakeGoal()), list[float]()
 
+    def error(resolution: float) -> float:
+        return rest + factor * (resolution / 1e-5) ** power
+
     def trial(resolution: float, _progress: object) -> SimpleNamespace:
         tried.append(resolution)
-        share = plan.goal.share * (rest + factor * (resolution / 1e-5) ** power)
+        share = plan.goal.share * smoothing * error(resolution)
         return SimpleNamespace(accuracy=SimpleNamespace(share=share, onset=0.0))
 
     monkeypatch.setattr(plan, "trial", trial)
+    monkeypatch.setattr(plan, "sample_errors", lambda at: np.array([error(at), 0.01]))
     monkeypatch.setattr(plan, "certify", lambda *_: None)
-    monkeypatch.setattr(plan, "finest_resolution", lambda size=None: 1e-5 if size else 1e-7)
+    monkeypatch.setattr(plan, "finest_resolution", lambda size=None: 1e-5 if size else 1e-9)
+    monkeypatch.setattr(plan, "grid", lambda _: SimpleNamespace(spacing=(1e-2, 1e-2)))
     field = plan.bake_coarsest(None)
-    assert 2 <= len(tried) <= trials
-    assert 0.5 * plan.goal.share <= field.accuracy.share <= plan.goal.share
+    assert len(tried) == trials
+    assert 0.7 * plan.goal.share <= field.accuracy.share <= plan.goal.share
+
+
+@pytest.mark.parametrize("resolution", [2e-5, 8e-6])
+def test_sampled_errors_are_those_of_the_whole_field(resolution: float) -> None:
+    """A lattice of closest points misses few, and no node that the probes need is left out."""
+    wood = Surface("wood", "H").texture
+    for texture in (WAVE, Profile(8e-5 * _ROUGH[0], 1e-4), wood):
+        scale = 1.0 if texture is not wood else 8.0
+        plan = BakePlan(texture, 4e-4, 1.0, BakeGoal(max_gain=math.inf))
+        field = plan.trial(scale * resolution, None)
+        sampled = plan.sample_errors(scale * resolution)
+        assert sampled == pytest.approx(plan.relative_errors(field.accuracy), rel=2e-3)
 
 
 @pytest.mark.parametrize("texture", [WAVE, Profile(8e-5 * _ROUGH[0], 1e-4)])

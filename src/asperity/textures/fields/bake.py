@@ -48,6 +48,16 @@ _POWERS = 1.3, 2.0
 _POWER_RANGE = 0.7, 3.0
 _LEAST_ERROR = 0.01
 _MAX_TRIALS = 12
+# The same share where errors are foreseen from samples, and those at which the search for it ends.
+_SAMPLED_AIM = 0.98
+_CLOSE_TO_AIM = 0.93, 1.0
+# What smoothing adds to an error, over the same in a trial of another resolution: it was measured
+# to be 0.2 to 1.3.
+_ADDED_BY_SMOOTHING = 1.3
+_MAX_SAMPLES = 5
+# Parts of the progress that is left of the first trial, and of each further one.
+_FIRST_PART = 0.1
+_NEXT_PART = 0.9
 _FLAT = 1e-9  # of the greatest force: less is rounding
 _BYTES_PER_NODE = 4
 # Height of the cells in which a field fades below its floor, over the range of the vertical force
@@ -227,6 +237,7 @@ class BakePlan:
         grid = self.grid(resolution)
         self.check_size(grid)
         quick, *repairs = node_potentials.lattice_columns(self.texture, self.continuity, grid)
+        self.quick_columns = quick
         repairs.append(self.columns)
         potentials = node_potentials.compute_potentials(
             quick, grid, progress, repairs=repairs, continuity=self.continuity
@@ -239,35 +250,64 @@ class BakePlan:
         return field
 
     def bake_coarsest(self, progress: Progress | None) -> PotentialField:
-        """Return the field of the coarsest resolution that reaches the goal.
-
-        Its errors follow powers of the resolution, first assumed and then those of two trials.
-        """
+        """Return the field of the coarsest resolution that reaches the goal."""
         finest = self.finest_resolution()
         coarsest = max(self.grid(math.inf).spacing)
         resolution = max(self.finest_resolution(_TRIAL_BYTES), finest)
         limits = [finest, coarsest]
-        powers = np.array(_POWERS)
-        last = resolution, np.ones(2)
-        for trial in range(_MAX_TRIALS):
-            done = 1.0 - 0.5**trial
-            field = self.trial(resolution, scale_progress(progress, done, 0.5 * (1.0 - done)))
+        tried: list[tuple[float, FloatArray]] = []
+        done = 0.0
+        for _trial in range(_MAX_TRIALS):
+            part = (1.0 - done) * (_NEXT_PART if tried else _FIRST_PART)
+            field = self.trial(resolution, scale_progress(progress, done, part))
+            done += part
             errors = self.relative_errors(field.accuracy)
             is_reached = bool(errors.max() <= 1.0)
             if resolution == limits[is_reached] or 0.5 <= errors.max() <= 1.0:
                 break
             limits[not is_reached] = resolution
-            if trial:
-                rise = np.log(errors / last[1]) / math.log(resolution / last[0])
-                powers = np.clip(rise, *_POWER_RANGE)
-            last = resolution, errors
-            resolution *= float(((_AIM / errors) ** (1.0 / powers)).min())
-            resolution = _between(resolution, limits, (finest, coarsest))
+            tried.append((resolution, errors))
+            resolution = _between(self.foresee(tried, limits), limits, (finest, coarsest))
         if resolution == finest and not is_reached:
             field.accuracy = replace(field.accuracy, is_limited=True)
-        left = 0.5 ** (trial + 1)
-        self.certify(field, scale_progress(progress, 1.0 - left, left))
+        self.certify(field, scale_progress(progress, done, 1.0 - done))
         return field
+
+    def foresee(self, tried: list[tuple[float, FloatArray]], limits: list[float]) -> float:
+        """Return the resolution [m], within limits, at which the goal is expected to be reached.
+
+        Errors of fields that are not smoothed are sampled at ever better guesses. Smoothing adds a
+        part to them that is known from the last trial, within a margin.
+
+        Args:
+            tried: resolutions [m] of the trials, and their errors over those of the goal.
+            limits: least and greatest resolution [m].
+        """
+        resolution, errors = tried[-1]
+        added = errors / self.sample_errors(resolution) - 1.0
+        ratio = 1.0 + added * np.where(added > 0.0, _ADDED_BY_SMOOTHING, 1.0)
+        samples = tried[-1:]
+        lower, upper = _CLOSE_TO_AIM
+        for _sample in range(_MAX_SAMPLES):
+            resolution = next_resolution(samples, _SAMPLED_AIM)
+            resolution = min(max(resolution, limits[0]), limits[1])
+            errors = ratio * self.sample_errors(resolution)
+            if lower <= errors.max() <= upper or resolution in limits:
+                break
+            samples.append((resolution, errors))
+        return resolution
+
+    def sample_errors(self, resolution: float) -> FloatArray:
+        """Return the errors of a field that is not smoothed, over those of the goal.
+
+        Only the nodes around the probes are computed, quickly.
+        """
+        grid = self.grid(resolution)
+        places = self.probes[:, :2], self.shallow[:, :2]
+        xy = np.unique(np.concatenate(places), axis=0)
+        depths = node_potentials.compute_around(self.quick_columns, grid, xy)
+        field = self._measured_field(grid.arguments(depths, self.lift), grid, 0)
+        return self.relative_errors(field.accuracy)
 
     def relative_errors(self, accuracy: FieldAccuracy) -> FloatArray:
         """Return the share of the force, and the distance of contact, over those of the goal."""
@@ -320,6 +360,12 @@ class BakePlan:
         arguments, passes = self._smooth(potentials, grid, limit)
         if is_large:
             arguments = grid.to_bricks(potentials, arguments)
+        return self._measured_field(arguments, grid, passes)
+
+    def _measured_field(
+        self, arguments: FieldArguments, grid: FieldGrid, passes: int
+    ) -> PotentialField:
+        """Return the field of coefficients, and its accuracy."""
         sizes = largest_coefficient(arguments), largest_step(arguments)
         force, energy = grid.error_bounds(self.lipschitz, passes, *sizes)
         field = PotentialField(
@@ -368,6 +414,23 @@ class BakePlan:
             weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
             node_potentials.smooth(potentials, weights, grid)
             passes += 1
+
+
+def next_resolution(tried: list[tuple[float, FloatArray]], aim: float = _AIM) -> float:
+    """Return the resolution [m] at which errors are expected at an aim.
+
+    Args:
+        tried: resolutions [m] and the errors there: they follow powers of the resolution, first
+            assumed and then those of the last two.
+        aim: greatest error.
+    """
+    resolution, errors = tried[-1]
+    powers = np.array(_POWERS)
+    if len(tried) > 1:
+        before, errors_before = tried[-2]
+        rise = np.log(errors / errors_before) / math.log(resolution / before)
+        powers = np.clip(rise, *_POWER_RANGE)
+    return resolution * float(((aim / errors) ** (1.0 / powers)).min())
 
 
 def _between(resolution: float, limits: list[float], ends: tuple[float, float]) -> float:

@@ -92,21 +92,48 @@ def compute_potentials(
     """
     *plane, levels = grid.node_counts
     count = math.prod(plane)
-    at_once = max(_NODES_PER_BLOCK // levels, 1)
-    z = grid.height(np.arange(levels))
     depths = np.empty((count, levels), np.float32)
-    offsets = grid.offsets()
-
-    def fill(first: int) -> None:
-        part = np.arange(first, min(first + at_once, count))
-        block = np.empty((len(part), levels))
-        columns(_plane_positions(grid, part), z, grid.margin, block)
-        depths[first : first + at_once] = block - offsets
-
-    run_in_threads(fill, range(0, count, at_once), progress)
+    _fill(depths, columns, grid, np.arange(count), progress)
     for repair in repairs:
         _replace_wrong(depths, repair, grid, continuity)
     return depths.reshape(grid.node_counts)
+
+
+def compute_around(columns: ColumnFunction, grid: FieldGrid, xy: FloatArray) -> SingleArray:
+    """Return what :func:`compute_potentials` does, at the nodes around places x, y (n, 2) [m].
+
+    They are those by which the field there is determined; all others are outside of the surface.
+    """
+    below = np.rint((xy - grid.start) @ np.linalg.pinv(grid.steps)).astype(np.intp)
+    is_used = np.zeros(grid.node_counts[:-1], bool)
+    for step in np.ndindex((3,) * is_used.ndim):
+        places = [grid.stored_nodes(k)[below[:, k] + step[k]] for k in range(is_used.ndim)]
+        is_used[tuple(places)] = True
+    outside = np.float32(-grid.margin) - grid.offsets().astype(np.float32)
+    depths = np.tile(outside, (is_used.size, 1))
+    _fill(depths, columns, grid, np.flatnonzero(is_used), None)
+    return depths.reshape(grid.node_counts)
+
+
+def _fill(
+    depths: SingleArray,
+    columns: ColumnFunction,
+    grid: FieldGrid,
+    numbers: NDArray[np.intp],
+    progress: Progress | None,
+) -> None:
+    """Write the depths of columns of nodes, which are given by their numbers, in threads."""
+    at_once = max(_NODES_PER_BLOCK // grid.levels, 1)
+    z = grid.height(np.arange(grid.levels))
+    offsets = grid.offsets()
+
+    def fill(first: int) -> None:
+        part = numbers[first : first + at_once]
+        block = np.empty((len(part), grid.levels))
+        columns(_plane_positions(grid, part), z, grid.margin, block)
+        depths[part] = block - offsets
+
+    run_in_threads(fill, range(0, len(numbers), at_once), progress)
 
 
 def _plane_positions(grid: FieldGrid, columns: NDArray[np.intp]) -> FloatArray:

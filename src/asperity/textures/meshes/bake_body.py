@@ -312,6 +312,10 @@ class _BodyPlan(bake.BakePlan):
         field.thin_map = thin_map if thin else None
         return field
 
+    def foresee(self, tried: list[tuple[float, FloatArray]], limits: list[float]) -> float:  # noqa: ARG002
+        """See :class:`BakePlan`; from the trials."""
+        return bake.next_resolution(tried)
+
     def grid(self, resolution: float) -> FieldGrid:
         """Return the grid around the body.
 
