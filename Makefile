@@ -75,7 +75,7 @@ lock: $(VENV)/installer  ## Resolve the dependencies anew
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --only-group installer -o bootstrap.lock
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --only-group mutants -o mutants.lock
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build -o requirements.lock
-	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build --group dev --group docs --extra cluster --extra formats --extra meshes --extra parquet --extra studies -o requirements-dev.lock
+	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build --group dev --group docs --extra cluster --extra formats --extra meshes --extra studies -o requirements-dev.lock
 
 clean:  ## Remove the virtual environment and what the tools left
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis report.html docs/_build docs/_generated docs/gallery

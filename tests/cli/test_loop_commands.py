@@ -233,7 +233,7 @@ def test_recording_of_a_later_format_is_refused(call: Call, tmp_path: Path) -> N
         (["info", "{still}"], "it is not an MCAP recording"),
         (["info", "."], "not a regular file"),
         (["replay", "missing.mcap"], "No such file"),
-        (["export", "{run}", "-o", "a.xls"], "must end in .csv, .mat, .parquet"),
+        (["export", "{run}", "-o", "a.xls"], "must end in .csv, .mat"),
         (["export", "{run}", "-o", "{run}"], "must be another file than the recording"),
         (["export", "{run}", "-o", "no/a.csv"], "folder that exists"),
         (["plot", "{run}", "-o", "a.gif"], "must end in .html, .svg, .png, .pdf"),

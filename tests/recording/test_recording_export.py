@@ -1,8 +1,7 @@
-"""Export of recordings to CSV, MATLAB and Parquet, without loss of precision."""
+"""Export of recordings to CSV and MATLAB, without loss of precision."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -45,25 +44,11 @@ def test_matlab_has_columns_by_name(recording: Recording, tmp_path: Path) -> Non
     assert '"law": "B"' in contents["about"][0]
 
 
-def test_parquet_has_columns_with_units(recording: Recording, tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="not run: no pyarrow here")
-    export_recording(recording, tmp_path / "run.parquet")
-    table = parquet.read_table(tmp_path / "run.parquet")
-    np.testing.assert_array_equal(table["applied_x"].to_numpy(), recording["applied x"])
-    assert table.schema.field("applied_x").metadata == {b"unit": b"N"}
-    assert b'"law": "B"' in table.schema.metadata[b"asperity"]
-
-
-def test_failed_export_is_an_error_and_leaves_no_file(
-    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(ParameterError, match=r"output must end in .csv, .mat, .parquet"):
+def test_failed_export_is_an_error_and_leaves_no_file(recording: Recording, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"output must end in .csv, .mat"):
         export_recording(recording, tmp_path / "run.xls")
     with pytest.raises(ParameterError, match="output cannot be written: No such file"):
         export_recording(recording, tmp_path / "no" / "run.csv")
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ParameterError, match=r"pip install 'asperity\[parquet\]'"):
-        export_recording(recording, tmp_path / "run.parquet")
     assert {path.name for path in tmp_path.iterdir()} == {"run.mcap"}
 
 

@@ -129,15 +129,6 @@ def test_reports_and_tables(kind: str, tmp_path: Path) -> None:
     assert len(scores) == 3 * labels + labels + compared
 
 
-def test_tables_as_parquet(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="not run: no pyarrow here")
-    result = analyse(design_of("rating"), records(design_of("rating"), 3))
-    result.trial_table.to_parquet(tmp_path / "trials.parquet")
-    table = parquet.read_table(tmp_path / "trials.parquet")
-    assert table.num_rows == len(result.trials)
-    assert table.schema.field("response time [s]").metadata == {b"unit": b"s"}
-
-
 def test_a_study_without_trials_is_refused() -> None:
     with pytest.raises(ParameterError, match="no trials"):
         analyse(design_of("rating"), [])

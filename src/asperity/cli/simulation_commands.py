@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
 import os
 import pickle
 from collections.abc import Callable
@@ -41,7 +40,6 @@ if TYPE_CHECKING:
     from asperity.laws import Law
     from asperity.scene.setup import Setup
     from asperity.sweeps.sweep_plan import SweepPlan
-    from asperity.sweeps.sweep_result import SweepResult
 
 _STIFFNESS = stiffness_option("the scene's, else 1000 N/m")
 _SIMULATE_ARGUMENTS = command_arguments("simulate")
@@ -251,7 +249,11 @@ def sweep_command(
 
     from asperity.report.pages.sweep_report import sweep_page
 
-    extra = _write_tables(result, Path(output)) if output is not None else ""
+    extra = ""
+    if output is not None:
+        table = Path(output) / "table.csv"
+        result.to_csv(table)
+        extra = f"Table: {table}"
     outputs.write(result, sweep_page(result), extra_line=extra)
 
 
@@ -289,15 +291,6 @@ def _confirm_many_cases(plan: SweepPlan, processes: int) -> None:
     )
     if not is_confirmed(f"{size_text}. Compute?"):
         raise ParameterError("vary", f"makes {size_text}; --yes computes them")
-
-
-def _write_tables(result: SweepResult, folder: Path) -> str:
-    """Write the table as CSV, and as Parquet where pyarrow is installed; return where."""
-    result.to_csv(folder / "table.csv")
-    if importlib.util.find_spec("pyarrow") is None:
-        return f"Table: {folder / 'table.csv'} (Parquet: pip install 'asperity[parquet]')"
-    result.to_parquet(folder / "table.parquet")
-    return f"Table: {folder / 'table.csv'}, {folder / 'table.parquet'}"
 
 
 @click.group("recording", cls=StrictGroup)
@@ -360,13 +353,11 @@ def plot_command(file: str, output: str) -> None:
         write_recording_report(open_recording(file), output)
 
 
-@recording_command.command("export", short_help="Export a recording as CSV, MAT or Parquet.")
+@recording_command.command("export", short_help="Export a recording as CSV or MAT.")
 @click.argument("file")
-@_output_option(
-    "The file to write: .csv, .mat (MATLAB), or .parquet (optional dependency 'parquet')."
-)
+@_output_option("The file to write: .csv or .mat (MATLAB).")
 def export_rows_command(file: str, output: str) -> None:
-    """Export the rows of the recording FILE with all digits as CSV, MAT or Parquet."""
+    """Export the rows of the recording FILE with all digits as CSV or MAT."""
     from asperity.recording.recording import open_recording
     from asperity.recording.table_export import export_recording
 

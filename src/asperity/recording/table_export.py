@@ -1,11 +1,11 @@
-"""Export of the rows of a recording as CSV, MATLAB or Parquet."""
+"""Export of the rows of a recording as CSV or MATLAB."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from asperity.core.errors import ParameterError
 from asperity.core.files import json_text, open_atomic
@@ -21,23 +21,21 @@ def export_recording(
 ) -> None:
     """Write the rows to a file, atomically; the suffix decides the format.
 
-    No digit is lost: text has 17 digits, the other formats are binary. Columns are named as in the
-    recording: in CSV with their units, in the other formats with underscores for blanks.
+    No digit is lost: text has 17 digits, the other format is binary. Columns are named as in the
+    recording: in CSV with their units, for MATLAB with underscores for blanks.
 
     Args:
         recording: the recording.
-        path: file that ends in .csv, .mat or .parquet.
+        path: file that ends in .csv or .mat.
         progress: called now and then with the completed fraction, in [0, 1].
 
     Raises:
-        ParameterError: for another suffix, a file that cannot be written, a library that is
-            missing, or more rows than the format takes.
+        ParameterError: for another suffix, a file that cannot be written, or more rows than the
+            format takes.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in TABLE_WRITERS:
         raise ParameterError("output", f"must end in {', '.join(TABLE_WRITERS)}", str(path))
-    if suffix == ".parquet":
-        import_pyarrow()  # an error before anything is written
     try:
         with open_atomic(path) as stream:
             TABLE_WRITERS[suffix](recording, stream, progress or (lambda _part: None))
@@ -73,38 +71,6 @@ def _write_mat(recording: Recording, stream: IO[bytes], progress: Progress) -> N
     savemat(stream, content, long_field_names=True)  # type: ignore[arg-type]  # streams are taken, too
 
 
-def _write_parquet(recording: Recording, stream: IO[bytes], progress: Progress) -> None:
-    arrow: Any = import_pyarrow()
-    from pyarrow import parquet
-
-    fields = [
-        arrow.field(_variable_name(name), arrow.float64(), metadata={"unit": unit})
-        for name, unit in recording.columns
-    ]
-    schema = arrow.schema(fields, metadata={"asperity": json_text(recording.metadata)})
-    done = 0
-    with parquet.ParquetWriter(stream, schema) as writer:
-        for block in recording.blocks():
-            columns = [arrow.array(column) for column in block.T]
-            writer.write_table(arrow.Table.from_arrays(columns, schema=schema))
-            done += len(block)
-            progress(done / recording.rows)
-
-
-def import_pyarrow() -> Any:
-    """Return pyarrow.
-
-    Raises:
-        ParameterError: if it is not installed.
-    """
-    try:
-        import pyarrow
-    except ImportError:
-        requirement = "needs pyarrow for .parquet: pip install 'asperity[parquet]'"
-        raise ParameterError("output", requirement) from None
-    return pyarrow
-
-
 def _variable_name(name: str) -> str:
     return name.replace(" ", "_")
 
@@ -112,6 +78,5 @@ def _variable_name(name: str) -> str:
 TABLE_WRITERS: Mapping[str, Callable[[Recording, IO[bytes], Progress], None]] = {
     ".csv": _write_csv,
     ".mat": _write_mat,
-    ".parquet": _write_parquet,
 }
 """Writers by suffix."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -208,7 +207,7 @@ def plan_study(path: str | Path, effect: float, **options: Any) -> StudyPlan:
 def write_report(folder: str | Path, result: StudyResult) -> list[str]:
     """Write key, tables and page of a result into the folder; return the names of the files.
 
-    The key unblinds the study. Tables are Parquet, too, where pyarrow is installed.
+    The key unblinds the study.
 
     Args:
         folder: of the study.
@@ -221,6 +220,4 @@ def write_report(folder: str | Path, result: StudyResult) -> list[str]:
     result.to_html(Path(folder) / "report.html")
     for name, table in {"trials": result.trial_table, "table": result}.items():
         table.to_csv(Path(folder) / f"{name}.csv")
-        if importlib.util.find_spec("pyarrow") is not None:
-            table.to_parquet(Path(folder) / f"{name}.parquet")
     return find_derived_files(folder)

@@ -39,11 +39,6 @@ class TrialTable(TableFiles):
     trials: Sequence[TrialRecord]
     excluded: Mapping[str, str]
 
-    @property
-    def metadata(self) -> dict[str, Any]:
-        """The design."""
-        return attributes_to_dict(self.design, *_DESIGN)
-
     def iterate_rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row for each trial; ``used`` tells whether the statistics use it.
 
@@ -110,11 +105,6 @@ class StudyResult(Reportable, TableFiles):
     def labels(self) -> Sequence[dict[str, Any]]:
         """What is estimated: conditions or pairs of conditions."""
         return METHODS[self.design.kind].label(self.design)
-
-    @property
-    def metadata(self) -> dict[str, Any]:
-        """The design."""
-        return self.trial_table.metadata | {"simulated": self.simulated}
 
     @property
     def trial_table(self) -> TrialTable:
@@ -191,7 +181,8 @@ class StudyResult(Reportable, TableFiles):
         """Return plain data with a schema number."""
         people = attributes_to_dict(self, "excluded", "omitted", "consistency")
         rows = to_plain_data(self.table_rows())
-        return {"schema": SCHEMA, "study": self.metadata, "rows": rows, **people}
+        study = attributes_to_dict(self.design, *_DESIGN) | {"simulated": self.simulated}
+        return {"schema": SCHEMA, "study": study, "rows": rows, **people}
 
 
 def label_text(result: StudyResult, row: Mapping[str, Any]) -> str:

@@ -30,14 +30,7 @@ from asperity.sweeps.sweep_result import LOCK_FILE, check_plan, lock_folder
 STUDY_FILE = "study.json"
 ANSWERS_FILE = "answers.jsonl"
 KEY_FILE = "key.json"
-DERIVED_FILES = (
-    KEY_FILE,
-    "report.html",
-    "trials.csv",
-    "table.csv",
-    "trials.parquet",
-    "table.parquet",
-)
+DERIVED_FILES = (KEY_FILE, "report.html", "trials.csv", "table.csv")
 """Files that a report writes; they hold data of all participants."""
 _NUMBER_FILE = "number.txt"
 SCHEMA = 1

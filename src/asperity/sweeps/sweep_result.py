@@ -1,4 +1,4 @@
-"""The result of a sweep: its folder, and its table as rows, CSV, Parquet, DataFrame or Dataset.
+"""The result of a sweep: its folder, and its table as rows, CSV, DataFrame or Dataset.
 
 The folder has one line per case, appended when the case is done. A process that is killed at any
 moment leaves whole lines, and at most one torn line at the end, which is removed when the folder is
@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -36,7 +35,6 @@ from asperity.core.files import (
     write_bytes,
 )
 from asperity.core.processes import defer_interrupt
-from asperity.recording.table_export import import_pyarrow
 from asperity.sweeps.case_runs import Outcome, RunKind, find_run
 from asperity.sweeps.sweep_plan import SweepPlan
 
@@ -45,18 +43,12 @@ CASE = "case"
 ERROR = "error"
 
 
-_BLOCK = 4096  # rows of Parquet that are in memory at a time
 UNIT = re.compile(r"(.*) \[(.+)\]")
 """Name and unit of a column."""
 
 
 class TableFiles(Tabular):
-    """A result whose table is written as CSV or Parquet."""
-
-    @property
-    @abstractmethod
-    def metadata(self) -> dict[str, Any]:
-        """What Parquet files say about the table: plain data."""
+    """A result whose table is written as CSV."""
 
     @abstractmethod
     def iterate_rows(self) -> Iterator[dict[str, Any]]:
@@ -86,15 +78,6 @@ class TableFiles(Tabular):
         """
         _write_file(path, self._write_csv)
 
-    def to_parquet(self, path: str | os.PathLike[str]) -> None:
-        """Write the table as Parquet, whose fields have the metadata ``unit``.
-
-        Raises:
-            ParameterError: if the file cannot be written, or pyarrow is not installed.
-        """
-        import_pyarrow()
-        _write_file(path, self._write_parquet)
-
     def _write_csv(self, stream: IO[bytes]) -> None:
         text = io.TextIOWrapper(stream, "utf-8", newline="", write_through=True)
         writer = csv.writer(text, lineterminator="\n")
@@ -102,28 +85,6 @@ class TableFiles(Tabular):
         for row in self.iterate_rows():
             writer.writerow([_csv_value(row.get(name)) for name in self.columns])
         text.detach()
-
-    def _write_parquet(self, stream: IO[bytes]) -> None:
-        arrow = import_pyarrow()
-        from pyarrow import parquet
-
-        types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64()}
-        fields = []
-        for name, kind in self.columns.items():
-            metadata = None
-            if match := UNIT.fullmatch(name):
-                metadata = {"unit": match[2]}
-            fields.append(arrow.field(name, types.get(kind, arrow.string()), metadata=metadata))
-        metadata = {"asperity": json_text(self.metadata)}
-        schema = arrow.schema(fields, metadata=metadata)
-        rows = self.iterate_rows()
-        with parquet.ParquetWriter(stream, schema) as writer:
-            while block := list(islice(rows, _BLOCK)):
-                arrays = []
-                for name, kind in self.columns.items():
-                    values = [_cast(row.get(name), kind) for row in block]
-                    arrays.append(arrow.array(values, schema.field(name).type))
-                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
 
 def _common_type(types: set[type]) -> type:
@@ -133,13 +94,6 @@ def _common_type(types: set[type]) -> type:
     if len(types) == 1:
         return types.pop()
     return str
-
-
-def _cast(value: Any, kind: type) -> Any:
-    """Return a value as a type; an unknown one stays ``None``."""
-    if value is None:
-        return None
-    return kind(value)
 
 
 def _csv_value(value: Any) -> Any:
@@ -192,11 +146,6 @@ class SweepResult(Reportable, TableFiles):
         types = self._column_types()
         types[ERROR] = types.pop(ERROR, str)
         return types
-
-    @property
-    def metadata(self) -> dict[str, Any]:
-        """The sweep, which Parquet files name."""
-        return self.plan.describe()
 
     def iterate_rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows in the order of the cases, without the columns that a row lacks.
