@@ -115,6 +115,19 @@ def test_smoothing_is_widened_where_it_no_longer_lowers_the_gain(
 
 
 @pytest.mark.parametrize(
+    ("name", "resolution"), [("cloth", 80e-6), ("noise:rms=20um,size=3mm", 60e-6)]
+)
+def test_deep_field_is_smoothed_to_its_goal(name: str, resolution: float) -> None:
+    """The gain of S²/2 grows with the depth S times its second derivatives."""
+    texture = Surface(name, "H").texture
+    field = bake.bake_texture(texture, 20e-3, resolution=resolution)
+    assert 0 < field.passes < BakeGoal().passes
+    assert 1.1 < field.gain.upper <= 1.15
+    raw = bake.bake_texture(texture, 20e-3, resolution=resolution, goal=BakeGoal(max_gain=math.inf))
+    assert raw.gain.upper > 1.4
+
+
+@pytest.mark.parametrize(
     ("power", "factor", "rest", "smoothing", "trials"),
     [
         (1.25, 5.0, 0.0, 1.5, 2),
