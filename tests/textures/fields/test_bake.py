@@ -154,6 +154,7 @@ def test_search_ends_with_the_second_trial_where_smoothing_adds_the_same(
 
     def trial(resolution: float, _progress: object) -> SimpleNamespace:
         tried.append(resolution)
+        plan.unsmoothed_errors = plan.sample_errors(resolution)
         share = plan.goal.share * smoothing * error(resolution)
         return SimpleNamespace(accuracy=SimpleNamespace(share=share, onset=0.0))
 
@@ -176,7 +177,8 @@ def test_sampled_errors_are_those_of_the_whole_field(resolution: float) -> None:
         plan = BakePlan(texture, 4e-4, 1.0, BakeGoal(max_gain=math.inf))
         field = plan.trial(scale * resolution, None)
         sampled = plan.sample_errors(scale * resolution)
-        assert sampled == pytest.approx(plan.relative_errors(field.accuracy), rel=2e-3)
+        assert sampled == pytest.approx(plan.unsmoothed_errors, rel=2e-3)
+        assert (plan.unsmoothed_errors == plan.relative_errors(field.accuracy)).all()
 
 
 @pytest.mark.parametrize("texture", [WAVE, Profile(8e-5 * _ROUGH[0], 1e-4)])

@@ -45,16 +45,19 @@ _TRIAL_BYTES = 2**20
 # distance of contact are assumed to follow, and the least and greatest; least error over the goal.
 _AIM = 0.88
 _POWERS = 1.3, 2.0
-_POWER_RANGE = 0.7, 3.0
+_LEAST_POWERS = 0.7, 1.2
+_GREATEST_POWER = 3.0
 _LEAST_ERROR = 0.01
 _MAX_TRIALS = 12
-# The same share where errors are foreseen from samples, and those at which the search for it ends.
+# The same share where errors are foreseen from samples, that from which on it is close enough, and
+# the resolution over that of the last trial from which on none are needed.
 _SAMPLED_AIM = 0.98
-_CLOSE_TO_AIM = 0.93, 1.0
-# What smoothing adds to an error, over the same in a trial of another resolution: it was measured
-# to be 0.2 to 1.3.
-_ADDED_BY_SMOOTHING = 1.3
-_MAX_SAMPLES = 5
+_CLOSE_TO_AIM = 0.93
+_NEAR = 0.65
+# What smoothing adds to either error, at most, over the same in a trial of another resolution: 0.2
+# to 1.3 was measured, and 0.5 to 0.9.
+_ADDED_BY_SMOOTHING = 1.3, 1.0
+_MAX_SAMPLES = 4
 # Parts of the progress that is left of the first trial, and of each further one.
 _FIRST_PART = 0.1
 _NEXT_PART = 0.9
@@ -237,7 +240,6 @@ class BakePlan:
         grid = self.grid(resolution)
         self.check_size(grid)
         quick, *repairs = node_potentials.lattice_columns(self.texture, self.continuity, grid)
-        self.quick_columns = quick
         repairs.append(self.columns)
         potentials = node_potentials.compute_potentials(
             quick, grid, progress, repairs=repairs, continuity=self.continuity
@@ -276,36 +278,42 @@ class BakePlan:
     def foresee(self, tried: list[tuple[float, FloatArray]], limits: list[float]) -> float:
         """Return the resolution [m], within limits, at which the goal is expected to be reached.
 
-        Errors of fields that are not smoothed are sampled at ever better guesses. Smoothing adds a
-        part to them that is known from the last trial, within a margin.
+        One close to that of the last trial is guessed. Otherwise errors of fields that are not
+        smoothed are sampled at ever better guesses; smoothing adds a part to them that is known
+        from the last trial, within a margin.
 
         Args:
             tried: resolutions [m] of the trials, and their errors over those of the goal.
             limits: least and greatest resolution [m].
         """
-        resolution, errors = tried[-1]
-        added = errors / self.sample_errors(resolution) - 1.0
+        last, errors = tried[-1]
+        resolution = next_resolution(tried)
+        if _NEAR < resolution / last < 1.0 / _NEAR:
+            return resolution
+        added = errors / self.unsmoothed_errors - 1.0
         ratio = 1.0 + added * np.where(added > 0.0, _ADDED_BY_SMOOTHING, 1.0)
         samples = tried[-1:]
-        lower, upper = _CLOSE_TO_AIM
+        reached = []
         for _sample in range(_MAX_SAMPLES):
-            resolution = next_resolution(samples, _SAMPLED_AIM)
-            resolution = min(max(resolution, limits[0]), limits[1])
+            resolution = min(max(next_resolution(samples, _SAMPLED_AIM), limits[0]), limits[1])
             errors = ratio * self.sample_errors(resolution)
-            if lower <= errors.max() <= upper or resolution in limits:
+            if errors.max() <= 1.0:
+                reached.append(resolution)
+            if _CLOSE_TO_AIM <= errors.max() <= 1.0 or resolution in limits:
                 break
             samples.append((resolution, errors))
-        return resolution
+        return max(reached, default=resolution)
 
     def sample_errors(self, resolution: float) -> FloatArray:
         """Return the errors of a field that is not smoothed, over those of the goal.
 
-        Only the nodes around the probes are computed, quickly.
+        Only the nodes around the probes are computed, and exactly: a lattice misses ever more
+        closest points where a field is deep, and nothing would repair them.
         """
         grid = self.grid(resolution)
         places = self.probes[:, :2], self.shallow[:, :2]
         xy = np.unique(np.concatenate(places), axis=0)
-        depths = node_potentials.compute_around(self.quick_columns, grid, xy)
+        depths = node_potentials.compute_around(self.columns, grid, xy)
         field = self._measured_field(grid.arguments(depths, self.lift), grid, 0)
         return self.relative_errors(field.accuracy)
 
@@ -357,7 +365,10 @@ class BakePlan:
         """
         is_large = potentials.nbytes > BRICK_BYTES
         limit = self.goal.max_gain * self.gain - _GAIN_OF_ROUNDING * is_large
-        arguments, passes = self._smooth(potentials, grid, limit)
+        arguments = grid.arguments(potentials, self.lift)
+        unsmoothed = self._measured_field(arguments, grid, 0)
+        self.unsmoothed_errors = self.relative_errors(unsmoothed.accuracy)
+        arguments, passes = self._smooth(potentials, grid, limit, arguments)
         if is_large:
             arguments = grid.to_bricks(potentials, arguments)
         return self._measured_field(arguments, grid, passes)
@@ -394,15 +405,21 @@ class BakePlan:
         return field
 
     def _smooth(
-        self, potentials: SingleArray, grid: FieldGrid, limit: float
+        self, potentials: SingleArray, grid: FieldGrid, limit: float, arguments: FieldArguments
     ) -> tuple[FieldArguments, int]:
-        """Smooth potentials until no gain is above a limit; return the field and the passes."""
+        """Smooth potentials until no gain is above a limit; return the field and the passes.
+
+        Args:
+            potentials: at the nodes; they are changed.
+            grid: the nodes.
+            limit: of the gain.
+            arguments: record of the field before it is smoothed.
+        """
         passes = 0
         before = np.inf
         ramp = RAMP
         cells = np.ones(grid.node_counts, np.uint8)
         while True:
-            arguments = grid.arguments(potentials, self.lift)
             cells = cells_above(arguments, limit, cells)
             count = int(np.count_nonzero(cells))
             if passes == self.goal.passes or count == 0:
@@ -413,6 +430,7 @@ class BakePlan:
             before = count
             weights, cells = node_potentials.spread_marks(cells, grid.border, ramp)
             node_potentials.smooth(potentials, weights, grid)
+            arguments = grid.arguments(potentials, self.lift)
             passes += 1
 
 
@@ -429,7 +447,7 @@ def next_resolution(tried: list[tuple[float, FloatArray]], aim: float = _AIM) ->
     if len(tried) > 1:
         before, errors_before = tried[-2]
         rise = np.log(errors / errors_before) / math.log(resolution / before)
-        powers = np.clip(rise, *_POWER_RANGE)
+        powers = np.clip(rise, _LEAST_POWERS, _GREATEST_POWER)
     return resolution * float(((aim / errors) ** (1.0 / powers)).min())
 
 

@@ -27,8 +27,9 @@ _REPAIRS_AT_ONCE = 64
 # Part of a second derivative of 1 that is left to rounding.
 _TOLERANCE = 0.01
 # Step of the levels of a lattice where cells are equally high, and the number of those below all.
+# Where they are farther apart than deep cells are high, ever more closest points are missed.
 _LATTICE_STEP = 2
-_LEVELS_BELOW = 4
+_LEVELS_BELOW = 12
 _MODES: Any = {PERIODIC: "wrap", MIRRORED: "mirror", ZERO: "nearest"}
 
 # Writes the depth [m], (n, levels), at columns of nodes at x, y (n, 2) and rising z (levels,) [m]:
