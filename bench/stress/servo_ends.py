@@ -165,6 +165,12 @@ class LateStartError(AssertionError):
 class Run:
     """A command on a pseudo-terminal, with a loop that holds a force.
 
+    Args:
+        device: stand-in.
+        folder: for its scene.
+        options: further ones of the command.
+        settings: further lines of the section ``[servo]`` of the scene.
+
     Attributes:
         command: the command.
         environment: of its process.
@@ -173,10 +179,10 @@ class Run:
         device: stand-in.
     """
 
-    def __init__(self, device: StandIn, folder: Path, *options: str) -> None:
+    def __init__(self, device: StandIn, folder: Path, *options: str, settings: str = "") -> None:
         self.device = device
         scene = folder / "scene.toml"
-        scene.write_text(SCENE)
+        scene.write_text(SCENE + settings)
         self._terminal, theirs = os.openpty()
         self.command = [
             *(sys.executable, "-m", "asperity", "run", str(scene)),

@@ -365,10 +365,7 @@ class BakePlan:
         """
         is_large = potentials.nbytes > BRICK_BYTES
         limit = self.goal.max_gain * self.gain - _GAIN_OF_ROUNDING * is_large
-        arguments = grid.arguments(potentials, self.lift)
-        unsmoothed = self._measured_field(arguments, grid, 0)
-        self.unsmoothed_errors = self.relative_errors(unsmoothed.accuracy)
-        arguments, passes = self._smooth(potentials, grid, limit, arguments)
+        arguments, passes = self._smooth(potentials, grid, limit)
         if is_large:
             arguments = grid.to_bricks(potentials, arguments)
         return self._measured_field(arguments, grid, passes)
@@ -405,16 +402,15 @@ class BakePlan:
         return field
 
     def _smooth(
-        self, potentials: SingleArray, grid: FieldGrid, limit: float, arguments: FieldArguments
+        self, potentials: SingleArray, grid: FieldGrid, limit: float
     ) -> tuple[FieldArguments, int]:
         """Smooth potentials until no gain is above a limit; return the field and the passes.
 
-        Args:
-            potentials: at the nodes; they are changed.
-            grid: the nodes.
-            limit: of the gain.
-            arguments: record of the field before it is smoothed.
+        The errors before that are ``unsmoothed_errors``.
         """
+        arguments = grid.arguments(potentials, self.lift)
+        unsmoothed = self._measured_field(arguments, grid, 0).accuracy
+        self.unsmoothed_errors = self.relative_errors(unsmoothed)
         passes = 0
         before = np.inf
         ramp = RAMP

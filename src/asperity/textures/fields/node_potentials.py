@@ -105,10 +105,10 @@ def compute_around(columns: ColumnFunction, grid: FieldGrid, xy: FloatArray) -> 
 
     They are those by which the field there is determined; all others are outside of the surface.
     """
-    below = np.rint((xy - grid.start) @ np.linalg.pinv(grid.steps)).astype(np.intp)
+    nearest = np.rint((xy - grid.start) @ np.linalg.pinv(grid.steps)).astype(np.intp)
     is_used = np.zeros(grid.node_counts[:-1], bool)
     for step in np.ndindex((3,) * is_used.ndim):
-        places = [grid.stored_nodes(k)[below[:, k] + step[k]] for k in range(is_used.ndim)]
+        places = [grid.stored_nodes(k)[nearest[:, k] + step[k]] for k in range(is_used.ndim)]
         is_used[tuple(places)] = True
     outside = np.float32(-grid.margin) - grid.offsets().astype(np.float32)
     depths = np.tile(outside, (is_used.size, 1))
