@@ -168,17 +168,27 @@ def test_search_ends_with_the_second_trial_where_smoothing_adds_the_same(
     assert 0.7 * plan.goal.share <= field.accuracy.share <= plan.goal.share
 
 
-@pytest.mark.parametrize("resolution", [2e-5, 8e-6])
-def test_sampled_errors_are_those_of_the_whole_field(resolution: float) -> None:
-    """A lattice of closest points misses few, and no node that the probes need is left out."""
-    wood = Surface("wood", "H").texture
-    for texture in (WAVE, Profile(8e-5 * _ROUGH[0], 1e-4), wood):
-        scale = 1.0 if texture is not wood else 8.0
-        plan = BakePlan(texture, 4e-4, 1.0, BakeGoal(max_gain=math.inf))
-        field = plan.trial(scale * resolution, None)
-        sampled = plan.sample_errors(scale * resolution)
-        assert sampled == pytest.approx(plan.unsmoothed_errors, rel=2e-3)
-        assert (plan.unsmoothed_errors == plan.relative_errors(field.accuracy)).all()
+@pytest.mark.parametrize(
+    ("texture", "depth", "resolution"),
+    [
+        (WAVE, 4e-4, 8e-6),
+        (Profile(8e-5 * _ROUGH[0], 1e-4), 4e-4, 8e-6),
+        ("wood", 4e-4, 1.6e-4),
+        ("noise:rms=20um,size=3mm", 20e-3, 6e-5),
+    ],
+)
+def test_sampled_errors_are_those_of_the_whole_field(
+    texture: str | Texture, depth: float, resolution: float
+) -> None:
+    """No closest point is missed, also far below, and no node that the probes need is left out."""
+    plan = BakePlan(Surface(texture, "H").texture, depth, 1.0, BakeGoal(max_gain=math.inf))
+    field = plan.trial(resolution, None)
+    assert plan.sample_errors(resolution) == pytest.approx(plan.unsmoothed_errors, rel=2e-3)
+    assert (plan.unsmoothed_errors == plan.relative_errors(field.accuracy)).all()
+    with pytest.MonkeyPatch.context() as patch:  # the negative control: one column per probe
+        patch.setattr(np, "ndindex", lambda shape: [(1,) * len(shape)])
+        missing = plan.sample_errors(resolution)
+    assert missing.max() > 2.0 * plan.unsmoothed_errors.max()
 
 
 @pytest.mark.parametrize("texture", [WAVE, Profile(8e-5 * _ROUGH[0], 1e-4)])
