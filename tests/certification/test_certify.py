@@ -23,6 +23,7 @@ from asperity.certification.renderers import FunctionRenderer, LibraryRenderer, 
 from asperity.certification.resolution import Resolution
 from asperity.contacts.warm_start import WARM_START_SIZE
 from asperity.core.checks import FloatArray
+from asperity.report.sentences.certification_sentences import certification_answer, point_text
 
 BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
 TEXTURE = Sinusoid(amplitude=0.4e-3, period=2e-3)
@@ -180,8 +181,10 @@ def test_memory_of_a_tick_is_dependence_on_history(library: str) -> None:
 
 
 def test_force_that_is_not_finite_is_found_with_its_place(library: str) -> None:
-    at = planted(library, "nan").invalid_at
+    result = planted(library, "nan")
+    at = result.invalid_at
     assert at is not None
+    assert certification_answer(result).startswith(f"The force is not finite at {point_text(at)}. ")
     assert abs(at[0] - 2e-4) < 5e-5
     assert abs(at[2] + 3e-4) < 5e-5
 

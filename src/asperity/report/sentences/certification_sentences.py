@@ -25,14 +25,17 @@ def point_text(point: tuple[float, ...] | None) -> str:
 
 
 def certification_answer(result: Certification) -> str:
-    """Return what was found in two or three sentences."""
+    """Return what was found in two or three sentences, a force that is not finite first."""
     gain = format_quantity(result.gain, "N/m", digits=4)
     calls = f"{result.calls:.3g} forces in {format_quantity(result.seconds, 's', digits=3)}"
-    return (
+    answer = (
         f"The gain is at least {gain}; {_leak_clause(result)}; {_jump_clause(result)}; "
         f"{_history_clause(result)}. No larger ones were found in {calls}, which proves nothing: "
         "on the laws of asperity such a search finds about 95 % of the true gain."
     )
+    if result.invalid_at is not None:
+        answer = f"The force is not finite at {point_text(result.invalid_at)}. {answer}"
+    return answer
 
 
 def _leak_clause(result: Certification) -> str:
