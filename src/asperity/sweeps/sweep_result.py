@@ -15,7 +15,7 @@ import re
 import weakref
 from abc import abstractmethod
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -76,7 +76,13 @@ class TableFiles(Tabular):
         Raises:
             ParameterError: if the file cannot be written.
         """
-        _write_file(path, self._write_csv)
+        try:
+            with open_atomic(path) as stream:
+                self._write_csv(stream)
+        except OSError as error:
+            raise ParameterError(
+                "output", f"cannot be written: {error.strerror}", str(path)
+            ) from None
 
     def _write_csv(self, stream: IO[bytes]) -> None:
         text = io.TextIOWrapper(stream, "utf-8", newline="", write_through=True)
@@ -101,15 +107,6 @@ def _csv_value(value: Any) -> Any:
     if isinstance(value, bool):
         return str(value).lower()
     return value
-
-
-def _write_file(path: str | os.PathLike[str], write: Callable[[IO[bytes]], None]) -> None:
-    try:
-        with open_atomic(path) as stream:
-            write(stream)
-    except OSError as error:
-        requirement = f"cannot be written: {error.strerror}"
-        raise ParameterError("output", requirement, os.fspath(path)) from None
 
 
 @dataclass(frozen=True, eq=False)
