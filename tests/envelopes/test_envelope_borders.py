@@ -220,4 +220,4 @@ def test_user_defined_law_has_borders() -> None:
 )
 def test_bad_input_names_the_argument(arguments: dict[str, object], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
-        envelope(**{"device": "touch", "laws": "C", "wavelengths": [1e-3], **arguments})  # type: ignore[arg-type]
+        envelope(**{"device": "touch", "laws": "C", "wavelengths": [1e-3], **arguments})  # type: ignore[arg-type]  # wrong ones

@@ -60,7 +60,7 @@ class Browser:
                 self.call(f"{domain}.enable")
             self.resize(*size)
             self.call("Page.navigate", url=address)
-        except BaseException:
+        except BaseException:  # also for an interrupt
             self._process.kill()
             raise
 

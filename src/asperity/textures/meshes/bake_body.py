@@ -312,8 +312,12 @@ class _BodyPlan(bake.BakePlan):
         field.thin_map = thin_map if thin else None
         return field
 
-    def foresee(self, tried: list[tuple[float, FloatArray]], limits: list[float]) -> float:  # noqa: ARG002
-        """See :class:`BakePlan`; from the trials."""
+    def foresee(
+        self,
+        tried: list[tuple[float, FloatArray]],
+        limits: list[float],  # noqa: ARG002 - of samples, which are not taken of a body
+    ) -> float:
+        """See :class:`BakePlan`; from the errors of the trials."""
         return bake.next_resolution(tried)
 
     def grid(self, resolution: float) -> FieldGrid:
