@@ -15,6 +15,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numba
+import numpy as np
 import pytest
 from numba import _dynfunc
 from numba.core import codegen, compiler, dispatcher, targetconfig, typed_passes, types
@@ -34,6 +35,7 @@ USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
     ),
     "link": (codegen.CPUCodeLibrary, "_get_module_for_linking", ("self",), "WideVectorLibrary"),
     "empty": (codegen.CPUCodegen, "_create_empty_module", ("self", "name"), "WideVectorLibrary"),
+    "passes": (codegen.CPUCodegen, "_module_pass_manager", None, "WideVectorLibrary"),
     "add": (codegen.CodeLibrary, "add_ir_module", ("self", "ir_module"), "WideVectorLibrary"),
     "lower": (typed_passes.NativeLowering, "run_pass", ("self", "state"), "LinkOnlyLowering"),
     "pipeline": (compiler.Compiler, "define_pipelines", ("self",), "LoopCompiler"),
@@ -73,6 +75,7 @@ def test_libraries_know_what_they_link() -> None:
     library = codegen.JITCPUCodegen("a test").create_library("a test")
     assert library._linking_libraries == [], message + "_shared_callees"
     assert library._shared_module is None, message + "WideVectorLibrary"
+    assert not list(library._final_module.functions), message + "WideVectorLibrary"
     assert library.codegen._engine._defined_symbols == set(), message + "MachineCodeCache._rebuild"
 
 
@@ -89,8 +92,50 @@ def test_pipeline_has_one_lowering_pass() -> None:
         instance.state = state
         (manager,) = instance.define_pipelines()
         steps = [step for step, _description in manager.passes]
+        (default,) = compiler.Compiler.define_pipelines(instance)
+        unneeded = {step for step, _description in default.passes} - set(steps)
+        unneeded.discard(typed_passes.NativeLowering)
+        assert unneeded == set(numba_internals.UNNEEDED_PASSES), message
         assert steps.count(kind.lowering) == 1, message
         assert typed_passes.NativeLowering not in steps, message
+
+
+def test_linked_functions_are_private_to_a_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    libraries: list[Any] = []
+    linkages: list[dict[str, str]] = []
+    passes = codegen.CPUCodegen._module_pass_manager
+
+    def create_passes(self: Any, **options: Any) -> Any:
+        for library in libraries:
+            functions = library.get_defined_functions()
+            linkages.append({function.name: function.linkage.name for function in functions})
+        return passes(self, **options)
+
+    class Library(numba_internals.WideVectorLibrary):
+        def _optimize_final_module(self) -> None:
+            libraries.append(self)
+            super()._optimize_final_module()
+
+    monkeypatch.setattr(numba_internals, "WideVectorLibrary", Library)
+    monkeypatch.setattr(codegen.CPUCodegen, "_module_pass_manager", create_passes)
+    options: Any = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+    link_only = {"no_cpython_wrapper": True, "pipeline_class": numba_internals.LinkOnlyCompiler}
+
+    @numba.njit(**options, **link_only)
+    def long_sum(x: Any) -> float:
+        total = 0.0
+        for i in range(x.shape[0]):
+            total += x[i]
+        return total
+
+    @numba.njit(**options, pipeline_class=numba_internals.LoopCompiler)
+    def loop(x: Any) -> float:
+        return 2.0 * long_sum(x)
+
+    assert loop(np.arange(4.0)) == 12.0
+    (names,) = linkages
+    assert [names[name] for name in names if "long_sum" in name] == ["internal"]
+    assert "linkonce_odr" not in names.values()
 
 
 def test_numba_dependency_has_an_upper_bound() -> None:

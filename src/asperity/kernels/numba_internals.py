@@ -2,18 +2,20 @@
 
 Private names: ``JITCodeLibrary`` with its methods ``_optimize_final_module``,
 ``_finalize_final_module``, ``_finalize_dynamic_globals``, ``_verify_declare_only_symbols`` and
-``_get_module_for_linking`` and its ``_linking_libraries`` and ``_shared_module``,
-``CPUCodegen._create_empty_module`` and ``_engine``, ``JitEngine._defined_symbols``,
-``_dynfunc.make_function``, ``Dispatcher._cache`` and ``_compiler``, ``CompileResult._rebuild`` and
-``_reduce``, ``registry.cpu_target``, ``BaseFunction.get_call_type`` and its ``_impl_keys``,
-``Flags._values``. The dependency on Numba has an upper bound for their sake, and
-``tests/kernels/test_numba_internals.py`` says which of them a new version changes.
+``_get_module_for_linking`` and its ``_final_module``, ``_linking_libraries`` and
+``_shared_module``, ``CPUCodegen._create_empty_module``, ``_module_pass_manager`` and ``_engine``,
+``JitEngine._defined_symbols``, ``_dynfunc.make_function``, ``Dispatcher._cache`` and ``_compiler``,
+``CompileResult._rebuild`` and ``_reduce``, ``registry.cpu_target``, ``BaseFunction.get_call_type``
+and its ``_impl_keys``, ``Flags._values``. The dependency on Numba has an upper bound for their
+sake, and ``tests/kernels/test_numba_internals.py`` says which of them a new version changes.
 
 Compilers. Numba optimises each function and generates machine code for it with everything that it
 calls, again at each level of a chain of calls. Only functions that Python calls need that. The
 others are link-only: their code is optimised in the loop that they are linked into. Identical
 link-only functions of several modules are lowered once. A shared function has machine code of its
-own, which its callers call. Loops are compiled for the widest vector registers of the processor.
+own, which its callers call. What is linked into either is private to it, so that LLVM drops what
+no call needs: a quarter of the time of some loops was the copying of records. Loops are compiled
+for the widest vector registers of the processor.
 
 Cache. Numba's own cache unpickles an index and code without verification: a flipped bit crashes
 every start, a planted file is executed. Here each compiled overload is one entry of
@@ -45,6 +47,7 @@ from numba.core import (
     targetconfig,
     typed_passes,
     types,
+    untyped_passes,
 )
 
 from asperity.core import cache
@@ -108,6 +111,19 @@ class WideVectorLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]  # see ab
                 set.add(function.attributes, '"prefer-vector-width"="512"')
         super().add_ir_module(ir_module)
 
+    def _optimize_final_module(self) -> None:
+        """Optimise the code with the functions that were linked into it, which it alone calls.
+
+        LLVM may then drop arguments that they do not use, such as most parts of a record, and
+        checks of their status. Numba's pass before this one is for reference counts.
+        """
+        linkage = llvmlite.binding.Linkage
+        for function in self._final_module.functions:
+            if function.linkage == linkage.linkonce_odr and not function.is_declaration:
+                function.linkage = linkage.internal
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
     def _get_module_for_linking(self) -> Any:
         return self._shared_module
 
@@ -145,17 +161,28 @@ class SharedLowering(WideVectorLowering):
         return super().run_pass(state)
 
 
+# They are for closures, array expressions and inlined overloads, which compiled modules do not hold
+# (:mod:`asperity.core.compiled`); looking for them took 6 % of the time of compilation.
+UNNEEDED_PASSES = (
+    untyped_passes.InlineClosureLikes,
+    typed_passes.NopythonRewrites,
+    typed_passes.InlineOverloads,
+)
+
+
 class _CustomLoweringCompiler(compiler.Compiler):  # type: ignore[misc]  # see above
     """Numba's compiler with a different lowering."""
 
     lowering: Any
 
     def define_pipelines(self) -> list[Any]:
-        """Return Numba's pipeline with its lowering replaced."""
+        """Return Numba's pipeline with its lowering replaced, without UNNEEDED_PASSES."""
         (manager,) = super().define_pipelines()
         replaced = {typed_passes.NativeLowering: self.lowering}
         manager.passes = [
-            (replaced.get(step, step), description) for step, description in manager.passes
+            (replaced.get(step, step), description)
+            for step, description in manager.passes
+            if step not in UNNEEDED_PASSES
         ]
         manager.finalize()
         return [manager]
@@ -253,7 +280,7 @@ def _global_key(value: object, known_ids: dict[FunctionType, int]) -> object:
 
 # How code is linked that entries hold. A version of the package that links in another way would
 # end with a segmentation fault: raise the number where the libraries or lowerings above change.
-_LINKING = 2
+_LINKING = 3
 
 
 class MachineCodeCache:
