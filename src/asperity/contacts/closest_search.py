@@ -61,7 +61,9 @@ from asperity.contacts.sampler_interface import (
 from asperity.core.compiled import EPS, EVERY_FUNCTION, SQRT_EPS, FloatArray, Kernels, local_array
 
 KERNELS = Kernels(
-    provides=EVERY_FUNCTION, shared=("closest_point", "closest_point_within_budget", "search_boxes")
+    provides=EVERY_FUNCTION,
+    shared=("closest_point", "closest_point_within_budget", "search_boxes"),
+    iterates=True,
 )
 
 # Least size of a box that is divided, as a share of the search region. Dividing one box after the

@@ -14,7 +14,7 @@ import numpy as np
 from asperity.contacts.sampler_interface import Derivatives, Point, evaluation_cost, sample_hessian
 from asperity.core.compiled import EPS, EVERY_FUNCTION, SQRT_EPS, Kernels
 
-KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("descend_within_budget",))
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("descend_within_budget",), iterates=True)
 
 
 def descend(x: float, y: float, z: float, start_x: float, start_y: float, texture: object) -> Point:
