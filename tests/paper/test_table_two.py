@@ -57,7 +57,7 @@ def test_agreement_of_each_row(table: TableTwo) -> None:
         "F": (False, False, True, True),
         "G": unknown,
     }
-    assert [row.law for row in table.rows if row.agrees] == ["A", "E"]
+    assert [row.law for row in table.rows if row.verdict == "yes"] == ["A", "E"]
 
 
 def test_numbers_by_brute_force(table: TableTwo) -> None:

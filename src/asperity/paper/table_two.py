@@ -177,11 +177,6 @@ class TableTwoRow(Serializable):
         return abs(self.energy - self.printed.energy) <= _ENERGY_TOLERANCE * scale
 
     @property
-    def agrees(self) -> bool:
-        """Whether the row is correct as printed."""
-        return self.verdict == "yes"
-
-    @property
     def verdict(self) -> str:
         """``"yes"`` if the row is correct, ``"new"`` if only a number is added, else ``"no"``."""
         facts_agree = self.conservativity_agrees and self.continuity_agrees and self.energy_agrees
@@ -215,11 +210,6 @@ class TableTwo(Serializable, Displayable):
         head = ["law", "q printed", "q", "q⁺", "conservative", "continuous", "loop", "stands"]
         return [head, *map(_cells, self.rows)]
 
-    def __repr__(self) -> str:
-        return (
-            f"<TableTwo: {sum([row.agrees for row in self.rows])} of {len(self.rows)} rows stand>"
-        )
-
 
 def table_two() -> TableTwo:
     """Return Table II of the paper with every entry computed.
@@ -236,7 +226,7 @@ def table_two() -> TableTwo:
 
     Example:
         >>> table = table_two()
-        >>> [row.law for row in table.rows if row.agrees]
+        >>> [row.law for row in table.rows if row.verdict == "yes"]
         ['A', 'E']
         >>> round(table.row("F").printed.value, 2), round(table.row("F").q.value, 4)
         (5.85, 2.4863)
