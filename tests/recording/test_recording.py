@@ -196,6 +196,7 @@ def test_rows_are_flushed_after_half_a_second(
         now[0] += wait
         out.append(random_rows(1))
         assert open_recording(path).rows == rows
+    assert repr(out) == "<RecordingWriter of run.mcap, 5 rows written>"
     out.append(random_rows(1))
     out.close()
     out.close()  # again: nothing to do

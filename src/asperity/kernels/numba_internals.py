@@ -117,10 +117,9 @@ class WideVectorLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]  # see ab
         LLVM may then drop arguments that they do not use, such as most parts of a record, and
         checks of their status. Numba's pass before this one is for reference counts.
         """
-        linkage = llvmlite.binding.Linkage
         for function in self._final_module.functions:
-            if function.linkage == linkage.linkonce_odr and not function.is_declaration:
-                function.linkage = linkage.internal
+            if function.linkage.name == "linkonce_odr" and not function.is_declaration:
+                function.linkage = "internal"
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
 
@@ -143,8 +142,7 @@ class WideVectorLowering(typed_passes.NativeLowering):  # type: ignore[misc]  # 
         """Lower a function."""
         state.library = WideVectorLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        changed: bool = super().run_pass(state)
-        return changed
+        return bool(super().run_pass(state))
 
 
 @compiler_machinery.register_pass(mutates_CFG=True, analysis_only=False)
@@ -294,11 +292,6 @@ class MachineCodeCache:
     def __init__(self, function: FunctionType, is_called: bool) -> None:
         self._function = function
         self._is_called = is_called
-
-    @property
-    def cache_path(self) -> str:
-        """The folder of the entries."""
-        return str(cache.cache_folder() / CODE_NAMESPACE)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled overload of a signature, or ``None`` to compile it."""

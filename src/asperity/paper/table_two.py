@@ -210,6 +210,10 @@ class TableTwo(Serializable, Displayable):
         head = ["law", "q printed", "q", "q⁺", "conservative", "continuous", "loop", "stands"]
         return [head, *map(_cells, self.rows)]
 
+    def __repr__(self) -> str:
+        verdicts = [row.verdict for row in self.rows]
+        return f"<TableTwo: {verdicts.count('yes')} of {len(verdicts)} rows stand>"
+
 
 def table_two() -> TableTwo:
     """Return Table II of the paper with every entry computed.

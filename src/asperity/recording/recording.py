@@ -52,10 +52,8 @@ class Recording(Plottable):
     _attachments: Mapping[str, tuple[int, int]] = field(repr=False, default_factory=dict)
 
     def __repr__(self) -> str:
-        text = f"Recording {self.path.name}, {self.rows} rows, {self.duration:g} s"
-        if not self.is_complete:
-            text += ", not closed"
-        return f"<{text}>"
+        state = "" if self.is_complete else ", not closed"
+        return f"<Recording {self.path.name}, {self.rows} rows, {self.duration:g} s{state}>"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -93,9 +93,8 @@ class Replay(Serializable, Displayable):
     limits: LimitCounts | None = None
 
     def __repr__(self) -> str:
-        if self.is_identical:
-            return f"<Replay of {self.rows} rows, the same bit for bit>"
-        return f"<Replay of {self.rows} rows, {self.differing_rows} differ>"
+        result = "the same bit for bit" if self.is_identical else f"{self.differing_rows} differ"
+        return f"<Replay of {self.rows} rows, {result}>"
 
     @property
     def is_identical(self) -> bool:

@@ -91,6 +91,9 @@ class RecordingWriter:
             raise ParameterError(argument, f"cannot be written: {error}") from None
         self._size = len(self._head.content)
 
+    def __repr__(self) -> str:
+        return f"<RecordingWriter of {self._path.name}, {self.rows} rows written>"
+
     def append(self, block: FloatArray) -> None:
         """Take rows, shape (n, columns); they are written when there are enough, or time is due.
 

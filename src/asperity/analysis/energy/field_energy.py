@@ -402,6 +402,10 @@ class SplitState:
     atoms: NDArray[np.intp]
     gap: FloatArray
 
+    def __repr__(self) -> str:
+        most = int(np.max(self.atoms, initial=0))
+        return f"<SplitState of {np.size(self.atoms)} points, into {most} points at most>"
+
 
 def split_state(surface: Surface, points: ArrayLike) -> SplitState:
     """Return potential, number of atoms and certified gap of law H.
