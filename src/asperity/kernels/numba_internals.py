@@ -123,9 +123,6 @@ class WideVectorLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]  # see ab
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
 
-    def _get_module_for_linking(self) -> Any:
-        return self._shared_module
-
     def _finalize_final_module(self) -> None:
         empty = self._codegen._create_empty_module(self.name)
         self._shared_module = llvmlite.binding.parse_assembly(str(empty))
@@ -292,6 +289,11 @@ class MachineCodeCache:
     def __init__(self, function: FunctionType, is_called: bool) -> None:
         self._function = function
         self._is_called = is_called
+
+    @property
+    def cache_path(self) -> str:
+        """The folder of the entries."""
+        return str(cache.cache_folder() / CODE_NAMESPACE)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled overload of a signature, or ``None`` to compile it."""
