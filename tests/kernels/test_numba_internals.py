@@ -138,6 +138,17 @@ def test_linked_functions_are_private_to_a_loop(monkeypatch: pytest.MonkeyPatch)
     assert "linkonce_odr" not in names.values()
 
 
+def test_list_comprehension_is_refused_as_by_numba() -> None:
+    options: Any = {"error_model": "numpy", "_nrt": False}
+
+    @numba.njit(**options, pipeline_class=numba_internals.LoopCompiler)
+    def loop(x: Any) -> float:
+        return sum([2.0 * value for value in x])
+
+    with pytest.raises(numba.TypingError, match="NRT required"):
+        loop(np.arange(4.0))
+
+
 def test_numba_dependency_has_an_upper_bound() -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))
     (bound,) = [r for r in project["project"]["dependencies"] if r.startswith("numba")]
