@@ -24,6 +24,7 @@ from asperity.textures.texture import Texture
 _NODES_PER_BLOCK = 10_000
 _MAX_REPLACEMENTS = 10
 _REPAIRS_AT_ONCE = 64
+_PLANES_PER_BLOCK = 16
 # Part of a second derivative of 1 that is left to rounding.
 _TOLERANCE = 0.01
 # Step of the levels of a lattice where cells are equally high, and the number of those below all.
@@ -154,10 +155,8 @@ def _replace_wrong(
     changed = np.arange(grid.levels)
     for trial in range(_MAX_REPLACEMENTS):
         wrong = np.zeros(depths.shape, bool)
-        for level in changed.tolist():
-            wrong[:, level] = _wrong_at_level(
-                depths, replaced[:, level], grid, continuity, level, 2**trial
-            )
+        mark = partial(_mark_wrong, wrong, depths, replaced, grid, continuity, 2**trial)
+        run_in_threads(mark, changed.tolist(), None)
         wrong &= ~replaced
         replaced |= wrong
         changed = np.flatnonzero(wrong.any(axis=0))
@@ -168,15 +167,16 @@ def _replace_wrong(
         run_in_threads(partial(_replace_columns, depths, repair, grid, wrong), parts, None)
 
 
-def _wrong_at_level(
+def _mark_wrong(
+    wrong: NDArray[np.bool_],
     depths: SingleArray,
     replaced: NDArray[np.bool_],
     grid: FieldGrid,
     continuity: float,
-    level: int,
     size: int,
-) -> NDArray[np.bool_]:
-    """Return the nodes of a level, by columns, less than ``size`` steps from a wrong one.
+    level: int,
+) -> None:
+    """Mark the nodes of a level, by columns, less than ``size`` steps from a wrong one.
 
     Nodes that were replaced before do not count as wrong.
     """
@@ -187,9 +187,9 @@ def _wrong_at_level(
     rounding = 2.0 * float(np.finfo(np.float32).eps * np.abs(stored).max() * np.abs(whole).max())
     plane = whole.reshape(*grid.node_counts[:-1], 1)
     marks = wrong_nodes(plane, grid, continuity, rounding)[..., 0]
-    marks &= ~replaced.reshape(marks.shape)
+    marks &= ~replaced[:, level].reshape(marks.shape)
     mode = _MODES[grid.border]
-    return np.asarray(ndimage.maximum_filter(marks, 2 * size - 1, mode=mode)).ravel()
+    wrong[:, level] = ndimage.maximum_filter(marks, 2 * size - 1, mode=mode).ravel()
 
 
 def _replace_columns(
@@ -248,21 +248,37 @@ def smooth(depths: SingleArray, weights: NDArray[np.uint8], grid: FieldGrid) -> 
         weights: 255 w at the nodes.
         grid: the nodes.
     """
+    for axis in range(depths.ndim):
+        is_vertical = axis == depths.ndim - 1
+        other = (axis + 1) % depths.ndim
+        smooth_block = partial(_smooth_planes, grid, axis - (axis > other), is_vertical)
+        _run_in_blocks(smooth_block, (depths, weights), other)
+
+
+def _run_in_blocks(function: Callable[..., Any], arrays: Sequence[Any], axis: int) -> None:
+    """Apply a function to arrays in threads, several planes at once, which are the first axis."""
+    planes = [np.moveaxis(array, axis, 0) for array in arrays]
+    starts = range(0, len(planes[0]), _PLANES_PER_BLOCK)
+    blocks = [[array[k : k + _PLANES_PER_BLOCK] for array in planes] for k in starts]
+    run_in_threads(lambda block: function(*block), blocks, None)
+
+
+def _smooth_planes(
+    grid: FieldGrid, axis: int, is_vertical: bool, depths: SingleArray, weights: NDArray[np.uint8]
+) -> None:
+    """Replace the depths of planes by means along an axis of the planes."""
     from scipy import ndimage
 
-    for axis in range(depths.ndim):
-        other = (axis + 1) % depths.ndim
-        mode = _MODES[grid.border if axis < depths.ndim - 1 else ZERO]
-        planes = np.moveaxis(depths, other, 0), np.moveaxis(weights, other, 0)
-        for plane, shares in zip(*planes, strict=True):
-            if not shares.any():
-                continue
-            change = ndimage.correlate1d(plane, [1.0, -2.0, 1.0], axis - (axis > other), mode=mode)
-            if axis == depths.ndim - 1:
-                change[..., 0] = 0.0
-                count = grid.stretched
-                change[..., 1 : count + 1] = _stretched_change(plane[..., : count + 2], grid)
-            np.add(plane, np.float32(NEIGHBOUR_WEIGHT / 255.0) * shares * change, out=plane)
+    mode = _MODES[ZERO if is_vertical else grid.border]
+    for plane, shares in zip(depths, weights, strict=True):
+        if not shares.any():
+            continue
+        change = ndimage.correlate1d(plane, [1.0, -2.0, 1.0], axis, mode=mode)
+        if is_vertical:
+            change[..., 0] = 0.0
+            count = grid.stretched
+            change[..., 1 : count + 1] = _stretched_change(plane[..., : count + 2], grid)
+        np.add(plane, np.float32(NEIGHBOUR_WEIGHT / 255.0) * shares * change, out=plane)
 
 
 def _stretched_change(depths: SingleArray, grid: FieldGrid) -> FloatArray:
@@ -286,5 +302,16 @@ def spread_marks(marks: NDArray[np.uint8], border: int, ramp: int = RAMP) -> tup
         before = weights
         for axis in range(marks.ndim):
             mode = _MODES[border if axis < marks.ndim - 1 else ZERO]
-            weights = function(weights, size, axis=axis, mode=mode)
+            other = (axis + 1) % marks.ndim
+            spread = partial(_filter_planes, function, size, axis + (axis < other), mode)
+            values = weights
+            weights = np.empty_like(values)
+            _run_in_blocks(spread, (values, weights), other)
     return before, weights
+
+
+def _filter_planes(
+    function: Callable[..., Any], size: int, axis: int, mode: str, values: Any, out: Any
+) -> None:
+    """Write what a filter of SciPy makes of planes along an axis."""
+    function(values, size, axis=axis, output=out, mode=mode)
