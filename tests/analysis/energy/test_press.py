@@ -130,7 +130,6 @@ def check_random_press(seed: int) -> bool:
 
 
 def test_start_at_a_press_is_that_of_an_own_bisection() -> None:
-    """A sample; ``python -m bench.stress.presses`` checks 100."""
     found = {check_random_press(seed) for seed in range(4)}
     assert found == {False, True}
 

@@ -61,12 +61,10 @@ class Monkey:
 
     Args:
         page: the page.
-        seed: another one does other things.
     """
 
-    def __init__(self, page: Browser, seed: int = 7) -> None:
-        self.page, self._chance = page, random.Random(seed)
-        self.done: dict[str, int] = {}
+    def __init__(self, page: Browser) -> None:
+        self.page, self._chance = page, random.Random(7)
         page.ask(_WATCH)
 
     def act(self) -> None:
@@ -82,11 +80,9 @@ class Monkey:
         }
         act = self._chance.choices(list(acts), list(acts.values()))[0]
         act()
-        name = act.__name__.strip("_")
-        self.done[name] = self.done.get(name, 0) + 1
 
-    def end(self) -> tuple[int, int, float, int]:
-        """Return errors in the page, frames beyond the greatest force, the greatest [N], frames."""
+    def end(self) -> tuple[int, int, float]:
+        """Return errors in the page, frames beyond the greatest force, and the greatest [N]."""
         page = self.page
         page.resize(*SIZES[0])
         page.ask("lab.tour.isActive && lab.tour.end(), 0")
@@ -95,7 +91,7 @@ class Monkey:
         page.until(f"lab.frame.number > {frames}")
         page.ask("clearInterval(lab.watch)")
         beyond, most, faults = page.ask("[lab.beyond, lab.most, lab.errorCount]")
-        return faults + len(page.said), beyond, most, frames
+        return faults + len(page.said), beyond, most
 
     def _place(self) -> tuple[float, float]:
         name = self._chance.choice(["relief", "section"])
