@@ -73,20 +73,10 @@ class Browser:
             pages = json.load(answer)
         return str(next(page for page in pages if page["type"] == "page")["webSocketDebuggerUrl"])
 
-    @property
-    def process(self) -> int:
-        """Of the browser, below which all its others are."""
-        return self._process.pid
-
-    def post(self, method: str, **parameters: Any) -> int:
-        """Say something, and wait for no answer; the number of what was said."""
-        number = next(self._numbers)
-        self._line.send(json.dumps({"id": number, "method": method, "params": parameters}))
-        return number
-
     def call(self, method: str, **parameters: Any) -> Any:
         """Say something, and return the answer."""
-        number = self.post(method, **parameters)
+        number = next(self._numbers)
+        self._line.send(json.dumps({"id": number, "method": method, "params": parameters}))
         while True:
             told = json.loads(self._line.recv(timeout=PATIENCE))
             if told.get("id") == number:
