@@ -22,7 +22,6 @@ from bench.speed import (
     nearest,
     recording,
     servo,
-    simulation,
     ticks,
     waiting,
 )
@@ -35,7 +34,6 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "ticks": ticks.run,
     "fields": fields.run,
     "bricks": bricks.run,
-    "simulation": simulation.run,
     "recording": recording.run,
     "servo": servo.run,
     "calibration": calibration.run,

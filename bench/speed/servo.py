@@ -30,6 +30,7 @@ from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
+from bench.speed.c_programs import run_command
 from bench.speed.timing import take_turns
 
 HERE = Path(__file__).parent / "c"
@@ -49,41 +50,33 @@ int at_once(int clock, int how, const void *due, void *rest)
 """
 
 
-@contextmanager
-def compile_source(text: str, *flags: str) -> Iterator[Path]:
-    """Compile C; yield the result."""
-    with tempfile.TemporaryDirectory() as folder:
-        source, made = Path(folder) / "source.c", Path(folder) / "made.so"
-        source.write_text(text)
-        subprocess.run(["gcc", "-O2", *flags, "-o", made, source], check=True)
-        yield made
-
-
-def loop_overhead(console: Console) -> None:
+def loop_overhead(console: Console, folder: Path) -> None:
     """Print what a sample costs besides device, law and waiting, with and without the clock."""
-    with compile_source(_NOTHING, "-shared", "-fPIC") as path:
-        driver = LibraryDriver(str(path))
-        shown, record = build_program(Surface(TEXTURE, "W", stiffness=300.0), driver), driver.open()
-        at_once = function_address(ctypes.CDLL(str(path)).at_once)
-        clocks = no_clock(), system_clock()._replace(wait=at_once)
+    source, path = folder / "nothing.c", folder / "nothing.so"
+    source.write_text(_NOTHING)
+    run_command("gcc", "-O2", "-shared", "-fPIC", source, "-o", path)
+    driver = LibraryDriver(str(path))
+    shown, record = build_program(Surface(TEXTURE, "W", stiffness=300.0), driver), driver.open()
+    at_once = function_address(ctypes.CDLL(str(path)).at_once)
+    clocks = no_clock(), system_clock()._replace(wait=at_once)
 
-        def go(index: int) -> None:
-            servo, board = Servo(1e-4, max_force=3.0), LoopMemory().block()
-            DriverLoop(driver, servo, PATIENT, 1.0, board, clocks[index]).run(
-                shown, record, SAMPLES
-            )
+    def go(index: int) -> None:
+        servo, board = Servo(1e-4, max_force=3.0), LoopMemory().block()
+        DriverLoop(driver, servo, PATIENT, 1.0, board, clocks[index]).run(shown, record, SAMPLES)
 
-        times = take_turns([lambda: go(0), lambda: go(1)], 9) / SAMPLES
+    times = take_turns([lambda: go(0), lambda: go(1)], 9) / SAMPLES
     for name, cost in zip(("without clock", "with clock"), np.median(times, axis=0), strict=True):
         console.print(f"a sample of the loop, {name}: {1e9 * cost:.0f} ns (goal: 1000)")
 
 
-def timekeeping(console: Console, seconds: float) -> None:
+def timekeeping(console: Console, folder: Path, seconds: float) -> None:
     """Print late samples at each rate, beside those of a loop in C that does nothing.
 
     Both run at the same time and on the same core, so that what else the machine does meets both.
     """
-    with compile_source((HERE / "nanosleep.c").read_text()) as bare, one_core():
+    bare = folder / "nanosleep"
+    run_command("gcc", "-O2", HERE / "nanosleep.c", "-o", bare)
+    with one_core():
         for rate in RATES:
             words = [str(bare), str(round(1e9 / rate)), str(seconds)]
             counted, said = _loop(rate, seconds, words)
@@ -121,45 +114,14 @@ def _loop(rate: float, seconds: float, beside: list[str]) -> tuple[LoopStatistic
         return loop.statistics, said
 
 
-def first_force(console: Console) -> None:
-    """Print how long the command takes with 0.1 s of rendering: its first force comes before."""
-    words = [
-        sys.executable,
-        "-m",
-        "asperity",
-        "run",
-        "sinusoid:amplitude=0.1mm,period=2mm",
-        "--device",
-        "touch",
-        "--law",
-        "C",
-        "--stiffness",
-        "300N/m",
-        "--duration",
-        "0.1s",
-        "--json",
-        os.devnull,
-    ]
-    subprocess.run(words, capture_output=True, check=True)  # compiles, where nothing is kept
-    took = []
-    for _ in range(5):
-        start = time.perf_counter()
-        subprocess.run(words, capture_output=True, check=True)
-        took.append(time.perf_counter() - start)
-    console.print(
-        f"asperity run, warm, start to end with 0.1 s of rendering: {np.median(took):.1f} s"
-        " (goal, to the first force: 3)"
-    )
-
-
 def run(console: Console, seconds: float = SECONDS) -> None:
     """Print what the loop costs and how it keeps time."""
     if shutil.which("gcc") is None:
         console.print("not run: no gcc")
         return
-    loop_overhead(console)
-    first_force(console)
-    timekeeping(console, seconds)
+    with tempfile.TemporaryDirectory() as folder:
+        loop_overhead(console, Path(folder))
+        timekeeping(console, Path(folder), seconds)
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ MEASURED = f"compare {LAND}"
 CHANGED = "--device touch --stiffness 700N/m"
 HTML = "--html {folder}/report.html --force"
 ONSET = "onset examples/press.toml"
+RUN = "run sinusoid:amplitude=0.1mm,period=2mm --law C --stiffness 300N/m --duration 0.1s"
 BAKED = "-o {folder}/baked.field --force"
 LAB = "lab --no-browser"
 
@@ -57,6 +58,8 @@ WAITS = [
     *((f"bake {name}", f"bake {name} {BAKED}", "bake", "wall 6") for name in ("tile", "wood")),
     ("bake sandpaper", f"bake sandpaper {BAKED}", "bake", "wall 15"),
     ("bake a measured surface", f"bake {LAND} {BAKED}", "bake", "wall 15"),
+    ("first run of 0.1 s", f"{RUN} --device touch", "run", ""),
+    ("  the same again", f"{RUN} --device touch", "run", "wall 3"),
     ("first page of the lab", LAB, "lab", "wall 5"),
     ("  the same again", LAB, "lab", ""),
     (f"{ONSET}, first", ONSET, "onset", ""),
