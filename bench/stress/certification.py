@@ -1,11 +1,8 @@
-"""What a search of our own laws as black boxes finds, and what it claims of harmless renderers.
+"""What a search of our own laws as black boxes finds.
 
 ``python -m bench.stress.certification [SECONDS [SURFACE [LAWS]]]`` compares the gain and the leak
 that a search of so many seconds (10 by default) finds with the certified ones, on five surfaces, or
 on one (such as knurl) for some laws (such as BG);
-``python -m bench.stress.certification controls [COUNT]`` searches so many conservative renderers
-(200 by default), exact, in single precision, with steps of position and of force, with noise, for
-0.7 s each, and prints how many had a fault;
 ``python -m bench.stress.certification jumps [CELLS [SECONDS]]`` prints in how many of the connected
 sets of jumps of law D, as a grid of so many cells along each axis (100 by default) shows them, a
 search of so many seconds (10 by default) finds one, on all cores.
@@ -15,7 +12,6 @@ from __future__ import annotations
 
 import pickle
 import sys
-from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -27,7 +23,6 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 from scipy import ndimage
-from scipy.interpolate import RectBivariateSpline
 
 from asperity import certify, characteristic_number, export_code, named_surface, worst_loop
 from asperity.certification.certify import Certification
@@ -40,10 +35,6 @@ from bench.speed.timing import number_table
 
 LAWS = "ABCEFGH"
 LEAKING = "ABEFG"
-STEPS = ("exact", "single", "encoder", "force steps", "both", "noise", "rare noise")
-_BOX = ((-1e-3, 1e-3), (-1e-3, 1e-3), (-1e-3, 1e-4))
-_NODES = 24
-CONTROL_SECONDS = 0.7
 _PROGRAM = """import pathlib, pickle
 surface = pickle.loads((pathlib.Path(__file__).parent / "surface.pickle").read_bytes())
 surface.force([[0.0, 0.0, 1.0]])
@@ -211,78 +202,9 @@ def jump_sets(
     return labels, int(count)
 
 
-def conservative_force(seed: int) -> tuple[Callable[[FloatArray], FloatArray], float]:
-    """Return the force of a wall with a random potential, and a bound of its gain [N/m].
-
-    A third of them are plane, and all have a kink where contact begins. They are exact, or have
-    steps of position or of force, or noise.
-    """
-    random = np.random.default_rng(seed)
-    stiffness = 10.0 ** random.uniform(2.0, 3.5)
-    side = np.linspace(-2e-3, 2e-3, _NODES)
-    amplitude = (seed % 3) * 1e-5
-    spline = RectBivariateSpline(side, side, amplitude * random.normal(size=(_NODES, _NODES)))
-
-    def exact(points: FloatArray) -> FloatArray:
-        x, y, z = points.T
-        depth = stiffness * np.maximum(spline.ev(x, y) - z, 0.0)
-        slopes = [spline.ev(x, y, dx=1), spline.ev(x, y, dy=1), -np.ones_like(x)]
-        return np.asarray(-np.stack(slopes, axis=1) * depth[:, None])
-
-    position_step = 10.0 ** random.uniform(-6.0, -4.26)
-    force_step = 10.0 ** random.uniform(-4.0, -2.0)
-    kind = STEPS[seed % len(STEPS)]
-
-    def force(points: FloatArray) -> FloatArray:
-        if kind == "single":
-            return exact(points.astype(np.float32).astype(float)).astype(np.float32).astype(float)
-        if kind in ("encoder", "both"):
-            points = position_step * np.round(points / position_step)
-        forces = exact(points)
-        if kind in ("force steps", "both"):
-            forces = force_step * np.round(forces / force_step)
-        if kind in ("noise", "rare noise"):
-            is_noisy = random.uniform(size=(len(points), 1)) < (1e-3 if kind == "rare noise" else 1)
-            forces = forces + force_step * is_noisy * random.normal(size=points.shape)
-        return forces
-
-    places = np.linspace(-1e-3, 1e-3, 400)
-    slope = np.hypot(spline(places, places, dx=1), spline(places, places, dy=1))
-    squares = np.zeros_like(slope)
-    for dx, dy in ((2, 0), (0, 2), (1, 1), (1, 1)):
-        squares = squares + spline(places, places, dx=dx, dy=dy) ** 2
-    depth = np.maximum(spline(places, places) + 1e-3, 0.0)
-    return force, 1.02 * stiffness * float((1.0 + slope**2 + depth * np.sqrt(squares)).max())
-
-
-def search_controls(count: int) -> None:
-    """Print how many conservative renderers were said to have a fault."""
-    table = number_table(
-        "renderers", "searched", "jumps", "loops", "history", "gain above truth", "calls"
-    )
-    counts = dict.fromkeys(STEPS, 0)
-    faults: Counter[tuple[str, str]] = Counter()
-    for seed in track(range(count), "searching"):
-        force, bound = conservative_force(seed)
-        found = certify(force, region=_BOX, seconds=CONTROL_SECONDS)
-        name = STEPS[seed % len(STEPS)]
-        counts[name] += 1
-        faults[name, "calls"] += found.calls
-        faults[name, "jumps"] += bool(found.jumps)
-        faults[name, "loops"] += found.worst_loop is not None
-        faults[name, "history"] += found.history.has_memory or not found.history.is_reset
-        faults[name, "gain"] += found.gain > bound
-    for name, number in counts.items():
-        numbers = [faults[name, fault] for fault in ("jumps", "loops", "history", "gain")]
-        table.add_row(name, *map(str, [number, *numbers]), f"{faults[name, 'calls']:.2g}")
-    Console().print(table)
-
-
 if __name__ == "__main__":
     arguments = sys.argv[1:]
-    if arguments[:1] == ["controls"]:
-        search_controls(*[int(number) for number in arguments[1:] or ["200"]])
-    elif arguments[:1] == ["jumps"]:
+    if arguments[:1] == ["jumps"]:
         search_jumps(*[int(number) for number in arguments[1:] or ["100"]])
     else:
         search_laws(float(arguments[0]) if arguments else 10.0, *arguments[1:])
