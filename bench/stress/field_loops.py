@@ -1,37 +1,19 @@
-"""Work of baked fields along closed paths, in the compiled tick.
-
-``python -m bench.stress.field_loops [LOOPS]`` prints the greatest work of random triangles in and
-around cloth over k l², l the longest edge, and the work along an ellipse and 300 random loops
-beside that of the law by search.
-"""
+"""Work of baked fields along closed paths, in the compiled tick."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
 
-from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
-from asperity.rendering import bake
 from asperity.surface import Surface
 from asperity.textures.fields.field_record import KNOT, FieldArguments
 from asperity.textures.fields.potential_field import PotentialField
 
 K = 1000.0
 DEPTH = 0.15e-3
-LOOPS = 1_000_000
-PART = 2500
-ELLIPSE_SIDES = 1334
-RANDOM_LOOPS = 300
-# K / (2 RATE) is the damping that takes the work of held forces.
-RATE, DAMPING = 4000.0, 0.125
-SEARCHED = 50  # evaluations of a search that is truncated often
 MAX_CROSSINGS = 4
 # Exact to degree 11, that of the force along a segment between knots.
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -134,81 +116,3 @@ def ellipse(surface: Surface, vertices: int) -> FloatArray:
     return np.column_stack(
         [1.223e-3 + 43.5e-6 * np.cos(angle), 1.288e-3 + 40.5e-6 * np.sin(angle), depth]
     )
-
-
-def random_loop(surface: Surface, rng: np.random.Generator, vertices: int) -> FloatArray:
-    """Return a closed path (n, 3) [m]: a random ellipse with a second harmonic, in contact."""
-    angle = 2.0 * np.pi * np.arange(vertices)[:, None] / vertices
-    frame = rng.uniform(-1.0, 1.0, (4, 3)) * [6e-5, 6e-5, 2e-5]
-    waves = np.cos(angle) * frame[0] + np.sin(angle) * frame[1]
-    waves += 0.3 * (np.cos(2.0 * angle) * frame[2] + np.sin(2.0 * angle) * frame[3])
-    top = surface.texture.extremes[1]
-    centre = [*rng.uniform(0.0, 3.36e-3, 2), top - rng.uniform(0.05e-3, 0.14e-3)]
-    return np.asarray(centre + waves)
-
-
-def add_rows(
-    table: Table, paths: dict[str, list[FloatArray]], baked: Surface, field: FieldArguments
-) -> None:
-    """Add the greatest work on each group of paths: exact, over k l², and held from tick to tick.
-
-    Held forces do work although the field does none; the damping takes it where it is at least
-    half of stiffness times sample period, and the gain is 1.
-    """
-    exact = Surface("cloth", "H", K, max_depth=DEPTH)
-    budgets = {"search": exact.law.contact.max_evaluations, f"search of {SEARCHED}": SEARCHED}
-    forces = {"baked": baked.trace} | {
-        name: partial(lambda budget, points: exact.trace(points, new_warm_start(budget)), budget)
-        for name, budget in budgets.items()
-    }
-    for group, members in paths.items():
-        for name, force in forces.items():
-            work, held = [], []
-            for path in members:
-                scale, end = K * float(np.square(np.ptp(path, axis=0)).sum()), np.roll(path, -1, 0)
-                work.append(edge_work(force, path, end, field).sum() / scale)
-                moves = end - path
-                held.append((force(path) * moves).sum() - DAMPING * RATE * np.square(moves).sum())
-            table.add_row(group, name, f"{np.max(work):+.1e}", f"{1e6 * np.max(held):+.2g}")
-
-
-def main(arguments: Sequence[str]) -> None:
-    count = int(arguments[0]) if arguments else LOOPS
-    exact = Surface("cloth", "H", K, max_depth=DEPTH)
-    for gain in (None, 1.15):
-        baked = bake(exact, 40e-6, max_gain=gain)
-        texture, worst, largest, brushing = baked.texture, 0.0, 0.0, list[FloatArray]()
-        assert isinstance(texture, PotentialField)
-        field = texture.arguments
-        for part in range(-(-count // PART)):
-            size = min(PART, count - part * PART)
-            loops = random_triangles(baked, size, part)
-            work, scale = triangle_work(baked.trace, loops, field)
-            total = np.abs(work.sum(axis=1)) / scale
-            rough = may_leave_twice(baked.trace, loops, field)
-            worst = max(worst, float(total[~rough].max()))
-            brushing.append(total[rough])
-            largest = max(largest, float((np.abs(work) / scale[:, None]).max()))
-        control, scale = triangle_work(
-            Surface("cloth", "A", K, max_depth=DEPTH).force, loops, field
-        )
-        of_a = float((np.abs(control.sum(axis=1)) / scale).max())
-        met = "met" if worst <= 1e-12 else "MISSED"
-        rest = np.concatenate(brushing)
-        print(
-            f"cloth, smoothed {texture.passes} times, {count:,} triangles: |work| / (k l²) <="
-            f" {worst:.1e} (goal 1e-12: {met}); of one edge {largest:.2f}; law A {of_a:.2f};"
-            f" {len(rest):,} of them brush the surface: {np.mean(rest <= 1e-12):.3%} as exact, the"
-            f" others <= {rest.max():.1e}, summed over kinks"
-        )
-        headings = "work over k l²", f"held at 4 kHz less {DAMPING} N·s/m [µJ]"
-        table = Table("paths", "law H", *headings, box=None)
-        rng = np.random.default_rng(0)
-        loops_of_law = [random_loop(baked, rng, 400) for _loop in range(RANDOM_LOOPS)]
-        paths = {"ellipse": [ellipse(baked, ELLIPSE_SIDES)], f"{RANDOM_LOOPS} loops": loops_of_law}
-        add_rows(table, paths, baked, field)
-        Console(width=100, highlight=False).print(table)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
