@@ -1,7 +1,5 @@
 """Random scenes with conservative laws: does one cycle that the program calls passive?
 
-``python -m bench.stress.random_scenes COUNT [SEED]`` counts them.
-
 k (q⁺/2 + d q) <= σ₀/T says that a conservative field with d samples of delay never gives more than
 the damping of the device takes. Each scene starts out of contact, where the field's energy is zero
 and no force waits, with an undamped hand; then at every sample the work that the texture has done
@@ -15,14 +13,11 @@ used before: K₀/q⁺, with K₀ where a heavy handle's wall cycles along its n
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.energy.leak import worst_loop
@@ -191,32 +186,3 @@ def outcomes(batch: list[Scene]) -> list[SceneOutcome]:
         lasting = outcome(batch[i], run)
         found[i] = replace(found[i], cycles=lasting.cycles)
     return found
-
-
-def delay_rule(count: int, seed: int, console: Console) -> int:
-    """Print how many scenes cycle that are called passive, and the negative controls; 1 if any."""
-    found: list[SceneOutcome] = []
-    for first in track(range(0, count, 200), "random scenes", console=console, transient=True):
-        some = list(scenes(min(200, count - first), seed + first))
-        found += outcomes([scene for scene in some if scene.passive])
-    counted = [each for each in found if each.is_valid]
-    broken = [each for each in counted if each.excess > ROUNDING or each.cycles]
-    console.print(
-        f"{count} random scenes, {len(found)} called passive, {len(counted)} of them in contact "
-        f"and within the depth of their numbers: {len(broken)} gain or cycle; their texture's work "
-        f"is at most {max(each.share for each in counted):.4f} of the loss"
-    )
-    for said, factor in (("6 to 12 times the limit", (6.0, 12.0)), ("the old rule, K₀/q⁺", None)):
-        drawn = list(scenes(200, seed, factor))
-        control = outcomes(drawn)
-        console.print(
-            f"control, {said}: of 200, {sum(each.excess > ROUNDING for each in control)} gain "
-            f"energy and {sum(each.cycles for each in control)} cycle; "
-            f"{sum(scene.passive for scene in drawn)} are called passive"
-        )
-    return int(bool(broken))
-
-
-if __name__ == "__main__":
-    number, seed = (*map(int, sys.argv[1:]), 1)[:2]
-    sys.exit(delay_rule(number, seed, Console(width=100, highlight=False)))
