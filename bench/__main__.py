@@ -15,7 +15,6 @@ from rich.console import Console
 from bench.speed import (
     batches,
     bricks,
-    certificates,
     export,
     fields,
     kernels,
@@ -38,7 +37,6 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "servo": servo.run,
     "calibration": calibration.run,
     "export": export.run,
-    "certificates": certificates.run,
     "waiting": waiting.run,
 }
 
