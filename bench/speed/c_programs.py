@@ -126,22 +126,22 @@ class Ticks(NamedTuple):
     Attributes:
         run: runs the ticks.
         forces: result [N], (n, 3).
-        gaps: result [m], (n,).
+        told: result, (n, 1) gaps [m], or (n, 2) with the evaluations of the surface.
     """
 
     run: Callable[[], object]
     forces: Any
-    gaps: Any
+    told: Any
 
     def result(self) -> Any:
         """Run the ticks and return forces and gaps, shape (n, 4)."""
         self.run()
-        return np.column_stack([self.forces, self.gaps])
+        return np.column_stack([self.forces, self.told[:, 0]])
 
 
 def program_ticks(program: ctypes.CDLL, name: str, points: Any, *, gaps: bool = True) -> Ticks:
     """Return ticks of a program along a path, in its precision; a gap is a call of its own."""
-    arrays = points, np.empty_like(points), np.empty(len(points), points.dtype)
+    arrays = points, np.empty_like(points), np.empty((len(points), 1), points.dtype)
     given = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays[: 2 + gaps]]
     run = partial(
         getattr(program, f"{name}_many"), *given, *[None] * (not gaps), ctypes.c_int64(len(points))
@@ -157,17 +157,22 @@ def ticks(program: ctypes.CDLL, name: str, points: Any) -> Any:
 def surface_ticks(surface: Surface, points: Any, max_evaluations: float | None = None) -> Ticks:
     """Return ticks of the kernel of loops and simulations along a path.
 
-    Batches have a sine of their own, :mod:`asperity.kernels.batch_sine`.
+    Nothing is remembered before. Batches have a sine of their own, ``kernels.batch_sine``.
     """
     law, out, told = surface.law, np.empty((len(points), 3)), np.empty((len(points), 2))
     friction = surface.contact_friction is not None
     clamp, sampler = surface.effective_clamp, surface.texture.sampler
     loops = fuse_on_texture(law, sampler, clamp, (path_loop,), has_friction=friction)
-    memory = new_warm_start(
-        law.contact.max_evaluations if max_evaluations is None else min(max_evaluations, UNLIMITED)
-    )
-    arguments = memory, surface.texture.arguments, surface.loop_arguments
-    return Ticks(partial(loops.path_batch, points, out, told, *arguments), out, told[:, 0])
+    budget = law.contact.max_evaluations if max_evaluations is None else max_evaluations
+    arguments = surface.texture.arguments, surface.loop_arguments
+    fresh = new_warm_start(min(budget, UNLIMITED))
+    memory = fresh.copy()
+
+    def run() -> None:
+        memory[:] = fresh
+        loops.path_batch(points, out, told, memory, *arguments)
+
+    return Ticks(run, out, told)
 
 
 def probes(texture: Texture, depth: float, count: int, seed: int) -> Any:

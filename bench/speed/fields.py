@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 from rich.console import Console
 
-from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
 from asperity.rendering import bake
 from asperity.surface import Surface
@@ -18,6 +16,7 @@ from asperity.textures.fields.field_grid import FieldGrid
 from asperity.textures.fields.node_potentials import lattice_columns, split_columns
 from asperity.textures.fields.potential_field import PotentialField
 from bench.speed import cases, ticks
+from bench.speed.c_programs import surface_ticks
 from bench.speed.timing import number_table, take_turns
 
 SPEED = 0.1
@@ -58,19 +57,9 @@ def stroke(texture: Texture, rate: float, count: int) -> FloatArray:
 
 def stroke_times(surface: Surface, paths: list[FloatArray]) -> list[float]:
     """Return ns per tick along each path, the median of turns."""
-    loop, arguments = surface._path_loops.path_batch, _arguments(surface)
-    budget = surface.law.contact.max_evaluations
-
-    def run(path: FloatArray, out: FloatArray, told: FloatArray) -> None:
-        loop(path, out, told, new_warm_start(budget), *arguments)
-
-    batches = [partial(run, path, np.empty_like(path), np.empty((len(path), 2))) for path in paths]
+    batches = [surface_ticks(surface, path).run for path in paths]
     times = np.median(take_turns(batches, TURNS), axis=0)
     return [float(time) / len(path) * 1e9 for time, path in zip(times, paths, strict=True)]
-
-
-def _arguments(surface: Surface) -> tuple[Any, Any]:
-    return surface.texture.arguments, surface.loop_arguments
 
 
 def print_nodes(console: Console) -> None:

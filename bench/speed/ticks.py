@@ -6,20 +6,17 @@ that an interruption by something else does not count.
 
 from __future__ import annotations
 
-from functools import partial
-from time import perf_counter
-
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray
 from asperity.rendering import rendered_surface
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Texture
 from asperity.textures.catalogue import as_texture
 from bench.speed import cases
+from bench.speed.c_programs import surface_ticks
 from bench.speed.timing import number_table, seconds
 
 SIDE = 512
@@ -109,16 +106,12 @@ def strokes_table() -> tuple[Table, list[str]]:
     for name, texture in textures.items():
         for law in "DEH":
             surface = Surface(texture, law, cases.STIFFNESS)
-            budget = surface.law.contact.max_evaluations
-            loop, arguments = surface._path_loops.path_batch, _arguments(surface)
             counts, times = [], []
             for path in strokes(surface):
-                out, told = np.empty_like(path), np.empty((TICKS, 2))
-                turn = partial(loop, path, out, told, new_warm_start(budget), *arguments)
-                turn()
-                times.append(min(seconds(turn) for _turn in range(TURNS)))
-                loop(path, out, told, new_warm_start(budget), *arguments)
-                counts.append(told.copy())
+                stroke = surface_ticks(surface, path)
+                stroke.run()
+                times.append(min(seconds(stroke.run) for _turn in range(TURNS)))
+                counts.append(stroke.told)
             bounds, evaluations = np.concatenate(counts).T
             share = float(np.mean(bounds > 0.0))
             cells = [f"{share:.2%}", f"{evaluations.mean():.0f}"]
@@ -153,19 +146,15 @@ def friction_ratios() -> dict[str, float]:
         times = []
         for friction in (0.0, 0.4):
             surface = rendered_surface(Surface("knurl", law, friction=friction))
-            path = strokes(surface)[3]
-            out, told = np.empty_like(path), np.empty((TICKS, 2))
-            memory = new_warm_start(surface.law.contact.max_evaluations)
-            loop = surface._path_loops.path_batch
-            turn = partial(loop, path, out, told, memory, *_arguments(surface))
-            turn()
-            times.append(min(seconds(turn) for _turn in range(20 * TURNS)))
+            stroke = surface_ticks(surface, strokes(surface)[3])
+            stroke.run()
+            times.append(min(seconds(stroke.run) for _turn in range(20 * TURNS)))
         ratios[law] = times[1] / times[0]
     return ratios
 
 
 def _run_longest(console: Console) -> None:
-    headings = ("longest\ntick µs", "evaluations", "truncated", "error\nbound µm", "no budget\nµs")
+    headings = ("longest\ntick µs", "evaluations", "truncated", "error\nbound µm")
     table = number_table("law", "surface", *headings, left=2)
     missed: list[str] = []
     surfaces: dict[str, tuple[Texture, FloatArray]] = {**adversarial_textures()}
@@ -199,36 +188,11 @@ def _probes(texture: Texture, centre: FloatArray) -> FloatArray:
 
 def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
     """Return the longest tick [µs], and the cells that tell of it."""
-    loop, arguments = surface._path_loops.path_batch, _arguments(surface)
-    out, told = np.empty((1, 3)), np.empty((1, 2))
-    budget = surface.law.contact.max_evaluations
     rows = []
     for probe in probes:
-        point = probe[None].copy()
-
-        times = []
-        for _turn in range(TURNS):
-            times.append(
-                seconds(partial(loop, point, out, told, new_warm_start(budget), *arguments))
-            )
-        rows.append((min(times) * 1e6, told[0, 1], told[0, 0]))
-    times_, looks, gaps = np.array(rows).T
-    # Without a budget a tick at a centre of curvature may take seconds: of random probes only.
-    exact = []
-    surface._loops.force_batch(probes[:1], out, *arguments)  # compiled, or loaded
-    for probe in probes[:PROBES]:
-        start = perf_counter()
-        surface._loops.force_batch(probe[None], out, *arguments)
-        exact.append((perf_counter() - start) * 1e6)
-    cells = [
-        f"{times_.max():.1f}",
-        f"{looks.max():.0f}",
-        f"{np.mean(gaps > 0.0):.0%}",
-        f"{gaps.max() * 1e6:.3g}",
-        f"{max(exact):.0f}",
-    ]
-    return float(times_.max()), cells
-
-
-def _arguments(surface: Surface) -> tuple[object, object]:
-    return surface.texture.arguments, surface.loop_arguments
+        tick = surface_ticks(surface, probe[None].copy())
+        least = min(seconds(tick.run) for _turn in range(TURNS))
+        rows.append((least * 1e6, *tick.told[0]))
+    times, gaps, looks = np.array(rows).T
+    cells = [f"{times.max():.1f}", f"{looks.max():.0f}", f"{np.mean(gaps > 0.0):.0%}"]
+    return float(times.max()), [*cells, f"{gaps.max() * 1e6:.3g}"]
