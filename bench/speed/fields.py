@@ -17,7 +17,7 @@ from asperity.textures.fields.node_potentials import lattice_columns, split_colu
 from asperity.textures.fields.potential_field import PotentialField
 from bench.speed import cases, ticks
 from bench.speed.c_programs import surface_ticks
-from bench.speed.timing import number_table, take_turns
+from bench.speed.timing import number_table, print_verdict, take_turns
 
 SPEED = 0.1
 RATES = (4000.0, 1000.0)
@@ -107,5 +107,4 @@ def run(console: Console) -> None:
             missed.append(name)
     console.print(f"strokes of {SPEED:g} m/s of {TICKS} ticks; of others {SEARCHED_TICKS}")
     console.print(table)
-    answer = "met" if not missed else f"MISSED on {', '.join(missed)}"
-    console.print(f"goals: 60 and 90 ns -> {answer}", style="bold")
+    print_verdict(console, "60 and 90 ns", missed)

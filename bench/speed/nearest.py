@@ -8,6 +8,7 @@ farther away by more than 1e-6 of the extent.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -18,7 +19,14 @@ from asperity.core.checks import FloatArray
 from asperity.textures import Fourier, HeightMap, Noise, Profile
 from asperity.textures.texture import Texture
 from bench.speed import cases, peers
-from bench.speed.timing import Batch, median_ratio, number_table, seconds, take_turns
+from bench.speed.timing import (
+    Batch,
+    affordable_count,
+    median_ratio,
+    number_table,
+    print_verdict,
+    take_turns,
+)
 from bench.stress.nearest_exhaustive import texture_extent
 
 ROUNDS = 7
@@ -58,7 +66,7 @@ class Subject:
 
 def run(console: Console) -> None:
     """Print a table of µs per query, and the verdict."""
-    headings = ("depth", "nearest\nµs", "slowest\nof 300", "force D\n/nearest", "k-d tree\nµs")
+    headings = ("depth", "nearest\nµs", "force D\n/nearest", "k-d tree\nµs")
     table = number_table("texture", *headings, "\nratio", "\nwrong")
     missed: list[str] = []
     for subject in _subjects():
@@ -68,13 +76,12 @@ def run(console: Console) -> None:
             table.add_row(subject.name, depth, *cells)
             missed += faults
     console.print(
-        "nearest point, medians of batches over random probes in turns; slowest of 300 on its own;"
+        "nearest point, medians of batches over random probes in turns;"
         f"\nwrong: farther than the nearest point by more than {WRONG:g} of the extent (asperity:"
         "\nnone in 1e5, python -m bench.stress.nearest_exhaustive)."
     )
     console.print(table)
-    answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
-    console.print(f"goals: {GOALS} -> {answer}", style="bold")
+    print_verdict(console, GOALS, missed)
 
 
 def _subjects() -> list[Subject]:
@@ -150,8 +157,10 @@ def _build_tree(subject: Subject) -> Tree:
 def _row(subject: Subject, depth_name: str, tree: Tree) -> tuple[list[str], list[str]]:
     """Return the cells of a row after its names, and the goals that it misses."""
     texture = subject.texture
-    points = _limit_points(texture, cases.probes(texture, MOST, subject.depths[depth_name]))
+    points = cases.probes(texture, MOST, subject.depths[depth_name])
     loop, arguments = texture._loops.nearest_batch, texture.arguments
+    few = partial(loop, points[:LEAST], np.empty((LEAST, 2)), arguments)
+    points = points[: affordable_count(few, LEAST, BATCH_SECONDS, MOST)]
     feet, out = np.empty((len(points), 2)), np.empty((len(points), 2))
     god = cases.kernel(texture, "D", points)
     compiled = _peers(texture)
@@ -163,27 +172,18 @@ def _row(subject: Subject, depth_name: str, tree: Tree) -> tuple[list[str], list
     times = take_turns(batches, ROUNDS)
     medians = np.median(times, axis=0) / len(points) * 1e6
     ratio = median_ratio(times, 1, 0)
-    cells = [f"{medians[0]:.2f}", f"{_slowest(texture, points):.1f}", f"{ratio:.2f}"]
     best = _distances(texture, points, feet)
     by_tree()
     wrong = _distances(texture, points, out) - best > WRONG * texture_extent(texture)
     share = f"{100 * wrong.mean():.2g} %"
-    cells += [f"{medians[2]:.2f}", f"{median_ratio(times, 2, 0):.1f}", share]
+    cells = [f"{medians[0]:.2f}", f"{ratio:.2f}", f"{medians[2]:.2f}"]
+    cells += [f"{median_ratio(times, 2, 0):.1f}", share]
     faults = []
     if medians[0] > subject.limits.get(depth_name, np.inf):
         faults.append(f"{subject.name} {depth_name} {medians[0]:.2f} µs")
     if ratio > FORCE_LIMIT:
         faults.append(f"D on {subject.name} {depth_name} {ratio:.2f}")
     return cells, faults
-
-
-def _limit_points(texture: Texture, points: FloatArray) -> FloatArray:
-    """Return as many of the probes as take a batch's time."""
-    loop, arguments = texture._loops.nearest_batch, texture.arguments
-    feet = np.empty((LEAST, 2))
-    loop(points[:LEAST], feet, arguments)  # compiled, or loaded
-    each = seconds(lambda: loop(points[:LEAST], feet, arguments)) / LEAST
-    return points[: int(np.clip(BATCH_SECONDS / each, LEAST, MOST))]
 
 
 def _peers(texture: Texture) -> ModuleType:
@@ -195,15 +195,3 @@ def _peers(texture: Texture) -> ModuleType:
 def _distances(texture: Texture, points: FloatArray, closest_points: FloatArray) -> FloatArray:
     away = np.column_stack([closest_points, texture.height(closest_points)]) - points
     return np.asarray(np.linalg.norm(away, axis=1))
-
-
-def _slowest(texture: Texture, points: FloatArray) -> float:
-    """Return the time of the slowest of 300 queries [µs], its call overhead taken off."""
-    loop, arguments = texture._loops.nearest_batch, texture.arguments
-    feet = np.empty((1, 2))
-    singles = [points[i : i + 1] for i in range(min(300, len(points)))]
-    calls = [lambda point=point: loop(point, feet, arguments) for point in singles]
-    empty = points[:0]
-    overhead = np.median(take_turns([lambda: loop(empty, feet, arguments)], 101))
-    each = np.median(take_turns(calls, 3), axis=0)
-    return float(each.max() - overhead) * 1e6

@@ -17,7 +17,7 @@ from asperity.textures import Fourier, HeightMap, Texture
 from asperity.textures.catalogue import as_texture
 from bench.speed import cases
 from bench.speed.c_programs import surface_ticks
-from bench.speed.timing import number_table, seconds
+from bench.speed.timing import number_table, print_verdict, seconds
 
 SIDE = 512
 PITCH = 50e-6
@@ -127,14 +127,13 @@ def run(console: Console) -> None:
     table, missed = strokes_table()
     console.print("strokes of 5 to 100 mm/s at 4 kHz, half and fully pressed, with the budgets")
     console.print(table)
-    answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
-    console.print(f"goal: at most {TRUNCATED:.1%} truncated -> {answer}", style="bold")
+    print_verdict(console, f"at most {TRUNCATED:.1%} truncated", missed)
     console.print()
     ratios = friction_ratios()
     cells = ", ".join(f"{law} {ratio:.2f}" for law, ratio in ratios.items())
-    answer = "met" if ratios["H"] <= FRICTION_RATIO else "MISSED"
     console.print(f"a tick on knurl with friction over one without: {cells}")
-    console.print(f"goal: H at most {FRICTION_RATIO} -> {answer}", style="bold")
+    over = [f"{ratios['H']:.2f}"] if ratios["H"] > FRICTION_RATIO else []
+    print_verdict(console, f"H at most {FRICTION_RATIO}", over)
     console.print()
     _run_longest(console)
 
@@ -172,9 +171,7 @@ def _run_longest(console: Console) -> None:
         "\nerror bound of D: a point may be nearer by so much; of H: of force over stiffness"
     )
     console.print(table)
-    answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
-    goals = "longest tick D 50, H 150 µs"
-    console.print(f"goals: {goals} -> {answer}", style="bold")
+    print_verdict(console, "longest tick D 50, H 150 µs", missed)
 
 
 def _probes(texture: Texture, centre: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from time import perf_counter
 
 import numpy as np
+from rich.console import Console
 from rich.table import Table
 
 from asperity.core.checks import FloatArray
@@ -35,9 +36,21 @@ def take_turns(batches: Sequence[Batch], rounds: int) -> FloatArray:
     return times[1:]
 
 
+def affordable_count(batch: Batch, count: int, span: float, most: int) -> int:
+    """Return how many points take a time [s]: from the count of a batch up to so many."""
+    batch()  # compiled, or loaded
+    return int(np.clip(span * count / min(seconds(batch), seconds(batch)), count, most))
+
+
 def median_ratio(times: FloatArray, index: int, reference: int) -> float:
     """Return the median over the rounds of the ratio of two batches of the same round."""
     return float(np.median(times[:, index] / times[:, reference]))
+
+
+def print_verdict(console: Console, goal: str, missed: Sequence[str]) -> None:
+    """Print whether a goal is met, and where it is not."""
+    answer = f"MISSED: {'; '.join(missed)}" if missed else "met"
+    console.print(f"goal: {goal} -> {answer}", style="bold")
 
 
 def number_table(*headings: str, left: int = 1) -> Table:
