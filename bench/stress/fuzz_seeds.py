@@ -6,37 +6,24 @@ import importlib.util
 import io
 import random
 import struct
-import sys
 import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.measured.writers import mesh_writer, sdf_writer, x3p_writer
+from tests.measured.writers.image_writer import write_png, write_tiff
 
 from bench.stress.damage import mutate
 
 ROOT = Path(__file__).parents[2]
-_WRITERS = ROOT / "tests" / "measured" / "writers"
 _DATA = ROOT.parent / "shared" / "data"
 _PNG_HEAD = 8
 
 Seeds = list[bytes]
-
-
-def _writer(name: str) -> ModuleType:
-    """Load a writer of the tests, which are no package."""
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, _WRITERS / f"{name}.py")
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module  # its dataclasses look themselves up here
-        spec.loader.exec_module(module)
-    return sys.modules[name]
 
 
 def _heights() -> NDArray[np.float64]:
@@ -45,14 +32,13 @@ def _heights() -> NDArray[np.float64]:
 
 
 def _x3p(folder: Path) -> Seeds:
-    writer = _writer("x3p_writer")
     specs = (
-        writer.X3pSpec(_heights() * 1e-6),
-        writer.X3pSpec(_heights(), code="I", z_type="I", z_increment="1e-9"),
-        writer.X3pSpec(_heights(), valid=_heights() > -20),
-        writer.X3pSpec(_heights()[:1] * 1e-6, feature="PRF"),
+        x3p_writer.X3pSpec(_heights() * 1e-6),
+        x3p_writer.X3pSpec(_heights(), code="I", z_type="I", z_increment="1e-9"),
+        x3p_writer.X3pSpec(_heights(), valid=_heights() > -20),
+        x3p_writer.X3pSpec(_heights()[:1] * 1e-6, feature="PRF"),
     )
-    return [writer.write_x3p(folder / "seed.x3p", spec).read_bytes() for spec in specs]
+    return [x3p_writer.write_x3p(folder / "seed.x3p", spec).read_bytes() for spec in specs]
 
 
 def _npy(_: Path) -> Seeds:
@@ -87,18 +73,16 @@ def _profile(_: Path) -> Seeds:
 
 
 def _sdf_text(folder: Path) -> Seeds:
-    writer = _writer("sdf_writer")
     stored = _heights()
     stored[2, 3] = np.nan
-    specs = (writer.SdfSpec(stored), writer.SdfSpec(stored, version="BCR-1.0", kind=5))
-    return [writer.write_ascii(folder / "seed.sdf", spec).read_bytes() for spec in specs]
+    specs = (sdf_writer.SdfSpec(stored), sdf_writer.SdfSpec(stored, version="BCR-1.0", kind=5))
+    return [sdf_writer.write_ascii(folder / "seed.sdf", spec).read_bytes() for spec in specs]
 
 
 def _sdf_binary(folder: Path) -> Seeds:
-    writer = _writer("sdf_writer")
-    specs = [writer.SdfSpec(_heights(), kind=kind) for kind in (5, 6, 7)]
-    specs.append(writer.SdfSpec(_heights(), kind=3, version="ISO-2.0"))
-    return [writer.write_binary(folder / "seed.sdf", spec).read_bytes() for spec in specs]
+    specs = [sdf_writer.SdfSpec(_heights(), kind=kind) for kind in (5, 6, 7)]
+    specs.append(sdf_writer.SdfSpec(_heights(), kind=3, version="ISO-2.0"))
+    return [sdf_writer.write_binary(folder / "seed.sdf", spec).read_bytes() for spec in specs]
 
 
 def _pictures() -> list[NDArray[Any]]:
@@ -112,12 +96,11 @@ def _png(folder: Path) -> Seeds:
     from asperity.export.surface_maps import height_png, normal_png, sample_map
     from asperity.textures import HeightMap
 
-    writer = _writer("image_writer")
     path = folder / "seed.png"
     sampled = sample_map(HeightMap(1e-6 * _heights(), 1e-5))
     return [
         *(
-            writer.write_png(path, picture, filters=filters).read_bytes()
+            write_png(path, picture, filters=filters).read_bytes()
             for picture in _pictures()
             for filters in (False, True)
         ),
@@ -129,11 +112,10 @@ def _png(folder: Path) -> Seeds:
 def _tiff(folder: Path) -> Seeds:
     from PIL import Image
 
-    writer = _writer("image_writer")
     path = folder / "seed.tif"
     pictures = [*_pictures(), _heights().astype(np.float32), _heights()]
     seeds = [
-        writer.write_tiff(path, p, photometric=2 if p.ndim == 3 else 1, big_endian=big).read_bytes()
+        write_tiff(path, p, photometric=2 if p.ndim == 3 else 1, big_endian=big).read_bytes()
         for p in pictures
         for big in (False, True)
     ]
@@ -145,14 +127,13 @@ def _tiff(folder: Path) -> Seeds:
 
 def _tiff_lengths(folder: Path) -> Seeds:
     """TIFF with the metadata of ImageJ and of OME."""
-    writer = _writer("image_writer")
     path, values = folder / "seed.tif", _heights().astype(np.float32)
     keys = "ImageJ=1.54f\nimages=1\nunit=micron\ncf=0\nc0=1.5\nc1=2.0\nvunit=nm\n"
     pixels = '<Pixels PhysicalSizeX="0.5" PhysicalSizeY="250" PhysicalSizeYUnit="nm" SizeX="12"/>'
     ome = f'<?xml version="1.0"?><OME xmlns="x"><Image>{pixels}</Image></OME>'
     tags = dict.fromkeys((282, 283), (5, struct.pack("<II", 4, 1)))
     return [
-        writer.write_tiff(path, values, tags={**tags, 270: (2, text.encode() + b"\0")}).read_bytes()
+        write_tiff(path, values, tags={**tags, 270: (2, text.encode() + b"\0")}).read_bytes()
         for text in (keys, ome)
     ]
 
@@ -168,21 +149,18 @@ def _columns(_: Path) -> Seeds:
 
 
 def _stl(folder: Path) -> Seeds:
-    writer = _writer("mesh_writer")
-    vertices, faces = writer.grid_mesh(_heights() / 100, 0.5)
-    return [writer.write_stl(folder / "seed.stl", vertices[faces]).read_bytes()]
+    vertices, faces = mesh_writer.grid_mesh(_heights() / 100, 0.5)
+    return [mesh_writer.write_stl(folder / "seed.stl", vertices[faces]).read_bytes()]
 
 
 def _stl_text(folder: Path) -> Seeds:
-    writer = _writer("mesh_writer")
-    vertices, faces = writer.grid_mesh(_heights()[:5, :6] / 100, 0.5)
-    return [writer.write_ascii_stl(folder / "seed.stl", vertices[faces]).read_bytes()]
+    vertices, faces = mesh_writer.grid_mesh(_heights()[:5, :6] / 100, 0.5)
+    return [mesh_writer.write_ascii_stl(folder / "seed.stl", vertices[faces]).read_bytes()]
 
 
 def _obj(folder: Path) -> Seeds:
-    writer = _writer("mesh_writer")
-    vertices, faces = writer.grid_mesh(_heights() / 100, 0.5)
-    return [writer.write_obj(folder / "seed.obj", vertices, faces).read_bytes()]
+    vertices, faces = mesh_writer.grid_mesh(_heights() / 100, 0.5)
+    return [mesh_writer.write_obj(folder / "seed.obj", vertices, faces).read_bytes()]
 
 
 def _frt(_: Path) -> Seeds:
