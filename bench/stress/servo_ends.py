@@ -22,7 +22,7 @@ import termios
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from mmap import mmap
 from pathlib import Path
@@ -135,27 +135,13 @@ class HaplyStandIn(StandIn):
         return Log(force, zero_at)
 
 
-class SimulatedStandIn(StandIn):
-    """The simulated device, whose force nobody sees from outside."""
-
-    def __init__(self) -> None:
-        self._kept = ExitStack()
-        self.driver, self.environment = "simulated", {}
-        self._begun = time.monotonic()
-
-    def read(self) -> Log:
-        """Return a force once the loop has had time to start; it ends with its process."""
-        return Log((1.0, 0.0, 0.0), 0)
-
-
 DEVICES: dict[str, Callable[[], StandIn]] = {
     "own": lambda: StandIn("fake_own.c", "{}"),
     "forcedimension": lambda: StandIn("fake_dhd.c", "forcedimension", "ASPERITY_LIBDHD"),
     "openhaptics": lambda: StandIn("fake_hd.c", "openhaptics", "ASPERITY_LIBHD"),
     "haply": HaplyStandIn,
-    "simulated": SimulatedStandIn,
 }
-"""A stand-in for each driver."""
+"""A stand-in for each vendor's driver, and for a device of a user."""
 
 
 class LateStartError(AssertionError):
@@ -211,8 +197,6 @@ class Run:
             log = self.device.read()
             self.children |= set(descendants(self.parent.pid))
             held = any(log.force)
-            if isinstance(self.device, SimulatedStandIn):
-                held = b" N" in self.said
             if held and not seen:
                 seen = time.monotonic()
             if held and time.monotonic() - seen > 0.5:
@@ -413,7 +397,7 @@ class End:
         ramp = RAMP if self.event in RAMPED else 0.0
         allowed = RELEASE + ramp + SILENCE.get(self.event, 0.0)
         released = (self.is_zero and self.delay <= allowed) or self.event in LOSSES
-        return (released or self.driver == "simulated") and not self.left
+        return released and not self.left
 
 
 def try_end(driver: str, event: str, draw: random.Random) -> End:
@@ -450,24 +434,19 @@ def _end_of_one_run(driver: str, event: str, draw: random.Random) -> End:
         return End(event, driver, zero, max(delay, 0.0), log.closed, code, len(left))
 
 
-@contextmanager
-def _printed(console: Console, ends: list[End]) -> Iterator[None]:
-    begun = time.monotonic()
-    yield
+def _print_ends(console: Console, ends: list[End]) -> None:
     by_event: dict[str, list[End]] = defaultdict(list)
     for end in ends:
         by_event[end.event].append(end)
     for event, some in sorted(by_event.items()):
-        seen = [end for end in some if end.driver != "simulated"]
-        zero = [1e3 * end.delay for end in seen if end.is_zero and end.delay < 1e9]
+        zero = [1e3 * end.delay for end in some if end.is_zero and end.delay < 1e9]
         text = f"median {statistics.median(zero):.1f} ms, worst {max(zero):.1f} ms" if zero else "-"
         console.print(
             f"{event:24} {len(some):3} ends, {sum(end.is_right for end in some):3} right; zero in"
-            f" {sum(end.is_zero for end in seen)} of {len(seen)}: {text}; closed in"
-            f" {sum(bool(end.closed) for end in seen)}; left {sum(end.left for end in some)}"
+            f" {sum(end.is_zero for end in some)}: {text}; closed in"
+            f" {sum(bool(end.closed) for end in some)}; left {sum(end.left for end in some)}"
         )
-    right = sum(end.is_right for end in ends)
-    console.print(f"{right} of {len(ends)} right, {time.monotonic() - begun:.0f} s")
+    console.print(f"{sum(end.is_right for end in ends)} of {len(ends)} right")
 
 
 def run(arguments: Sequence[str], console: Console) -> int:
@@ -481,18 +460,18 @@ def run(arguments: Sequence[str], console: Console) -> int:
     pairs = [(driver, event) for event in EVENTS for driver in drivers]
     if not table:
         pairs = [(draw.choice(drivers), draw.choice(list(EVENTS))) for _ in range(count)]
-    with _printed(console, ends):
-        for driver, event in pairs:
-            silent = "call" in event and driver in {"haply", "simulated"}
-            try:
-                ends.append(try_end("own" if silent else driver, event, draw))
-            except AssertionError as error:
-                words = str(error).splitlines()[-1][-100:]
-                console.print(f"  not started: {driver}, {event}: {words}", markup=False)
-                continue
-            console.file.flush()
-            if not ends[-1].is_right:
-                console.print(f"  wrong: {ends[-1]}", markup=False)
+    for driver, event in pairs:
+        silent = "call" in event and driver == "haply"
+        try:
+            ends.append(try_end("own" if silent else driver, event, draw))
+        except AssertionError as error:
+            words = str(error).splitlines()[-1][-100:]
+            console.print(f"  not started: {driver}, {event}: {words}", markup=False)
+            continue
+        console.file.flush()
+        if not ends[-1].is_right:
+            console.print(f"  wrong: {ends[-1]}", markup=False)
+    _print_ends(console, ends)
     return sum(not end.is_right for end in ends)
 
 
