@@ -8,17 +8,18 @@ so the mark of the profile is taken off and the start-up code of a Cortex-A is l
 from __future__ import annotations
 
 import shutil
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.export.c99 import c99_files
 from asperity.export.surface_functions import ExportRequest
 from asperity.surface import Surface
+from bench.speed import c_programs
+from bench.speed.c_programs import run_command
 
 SKETCH = Path(__file__).parents[2] / "examples" / "export" / "cortex_m.c"
 TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-objcopy", "arm-none-eabi-size", "qemu-arm")
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wdouble-promotion")
+STRICT = (*c_programs.STRICT, "-Wdouble-promotion")
 SMALL = ("-Os", "-ffunction-sections", "-Wl,--gc-sections", "--specs=rdimon.specs")
 MICRO = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 HOST = ("-mcpu=cortex-a7", "-mthumb", "-mfloat-abi=hard", "-mfpu=vfpv4-d16")
@@ -47,11 +48,6 @@ class Firmware:
     output: str
 
 
-def _run(*command: str | Path) -> str:
-    words = [str(part) for part in command]
-    return subprocess.run(words, check=True, capture_output=True, text=True).stdout
-
-
 def build_firmware(surface: Surface, folder: Path) -> Firmware:
     """Build the sketch of a surface, and run it."""
     order = ExportRequest(surface, precision="float")
@@ -60,11 +56,11 @@ def build_firmware(surface: Surface, folder: Path) -> Firmware:
     sources = [SKETCH, *folder.glob("texture_data.c")]
     whole, empty = folder / "sketch.elf", folder / "empty.elf"
     given = (*STRICT, *SMALL, *MICRO, "-DSILENT", f"-I{folder}")
-    _run(TOOLS[0], *given, *sources, "-lm", "-o", whole)
+    run_command(TOOLS[0], *given, *sources, "-lm", "-o", whole)
     (folder / "empty.c").write_text(
         "#include <stdlib.h>\nint main(int n, char **w) { return n > 1 ? atoi(w[1]) : 8; }\n"
     )
-    _run(TOOLS[0], *given, folder / "empty.c", "-o", empty)
+    run_command(TOOLS[0], *given, folder / "empty.c", "-o", empty)
     size, nothing = (_sizes(one) for one in (whole, empty))
     shown = _build_runnable(folder, sources, "shown")
     silent = _build_runnable(folder, sources, "silent", "-DSILENT")
@@ -73,13 +69,13 @@ def build_firmware(surface: Surface, folder: Path) -> Firmware:
         flash=size[0] - nothing[0],
         ram=size[1] - nothing[1],
         instructions=(many - few) / 100.0,
-        output=_run(TOOLS[3], "-cpu", "cortex-a15", shown, "8"),
+        output=run_command(TOOLS[3], "-cpu", "cortex-a15", shown, "8"),
     )
 
 
 def _sizes(program: Path) -> tuple[int, int]:
     """Return flash (code, constants, first values) and RAM (variables) in bytes."""
-    text, data, bss = map(int, _run(TOOLS[2], program).splitlines()[1].split()[:3])
+    text, data, bss = map(int, run_command(TOOLS[2], program).splitlines()[1].split()[:3])
     return text + data, data + bss
 
 
@@ -88,11 +84,13 @@ def _build_runnable(folder: Path, sources: list[Path], name: str, *flags: str) -
     objects = []
     for source in sources:
         made = folder / f"{name}_{source.stem}.o"
-        _run(TOOLS[0], *STRICT, "-Os", *MICRO, *flags, f"-I{folder}", "-c", source, "-o", made)
-        _run(TOOLS[1], "--remove-section", ".ARM.attributes", made)
+        run_command(
+            TOOLS[0], *STRICT, "-Os", *MICRO, *flags, f"-I{folder}", "-c", source, "-o", made
+        )
+        run_command(TOOLS[1], "--remove-section", ".ARM.attributes", made)
         objects.append(made)
     program = folder / f"{name}.elf"
-    _run(TOOLS[0], *HOST, "--specs=rdimon.specs", *objects, "-lm", "-o", program)
+    run_command(TOOLS[0], *HOST, "--specs=rdimon.specs", *objects, "-lm", "-o", program)
     return program
 
 
@@ -100,6 +98,6 @@ def _count_instructions(folder: Path, program: Path, ticks: int) -> int:
     """Return how many instructions a run takes."""
     log = folder / "executed.log"
     traced = ("-singlestep", "-d", "exec,nochain", "-D", log, "-cpu", "cortex-a15")
-    _run(TOOLS[3], *traced, program, str(ticks))
+    run_command(TOOLS[3], *traced, program, str(ticks))
     with log.open(encoding="utf-8", errors="replace") as lines:
         return sum(line.startswith("Trace") for line in lines)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.textures import HeightMap, Sinusoid
 from asperity.textures.texture import Texture
+from bench.speed.c_programs import run_command
 from bench.speed.cases import Kernel
 
 LAWS = "WABCG"
@@ -47,15 +47,13 @@ def build(directory: Path, extra: Sequence[str] = (), name: str = "reference.c")
     """Return a library of this folder's C, compiled into the directory."""
     source = _FOLDER / name
     library = directory / f"{source.stem}{'_'.join(['', *extra]).replace('=', '-')}.so"
-    command = ["gcc", "-std=c11", *FLAGS, *extra, str(source), "-o", str(library), "-lm"]
-    subprocess.run(command, check=True)
+    run_command("gcc", "-std=c11", *FLAGS, *extra, source, "-o", library, "-lm")
     return ctypes.CDLL(str(library))
 
 
 def compiler() -> str:
     """Return the first line of ``gcc --version``."""
-    answer = subprocess.run(["gcc", "--version"], check=True, capture_output=True, text=True)
-    return answer.stdout.splitlines()[0]
+    return run_command("gcc", "--version").splitlines()[0]
 
 
 def _texture(texture: Texture) -> ctypes.Structure:
