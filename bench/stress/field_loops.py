@@ -86,18 +86,16 @@ def random_triangles(surface: Surface, count: int, seed: int) -> FloatArray:
 
 
 def triangle_work(
-    force: Force, loops: FloatArray, field: FieldArguments, stiffness: float = K
+    force: Force, loops: FloatArray, field: FieldArguments
 ) -> tuple[FloatArray, FloatArray]:
     """Return the work of each edge of triangles (n, 3, 3), and k l² of each triangle [J]."""
     ends = np.roll(loops, -1, axis=1)
-    scale = stiffness * np.square(np.linalg.norm(ends - loops, axis=-1).max(axis=1))
+    scale = K * np.square(np.linalg.norm(ends - loops, axis=-1).max(axis=1))
     work = edge_work(force, loops.reshape(-1, 3), ends.reshape(-1, 3), field)
     return work.reshape(-1, 3), scale
 
 
-def may_leave_twice(
-    force: Force, loops: FloatArray, field: FieldArguments, stiffness: float = K
-) -> NDArray[np.bool_]:
+def may_leave_twice(force: Force, loops: FloatArray, field: FieldArguments) -> NDArray[np.bool_]:
     """Return which triangles (n, 3, 3) may leave the surface twice between two knots.
 
     Their work is not summed exactly. Others are at least a tenth of a spacing deep at closely
@@ -105,7 +103,7 @@ def may_leave_twice(
     """
     share = np.arange(SAMPLES)[:, None] / SAMPLES
     points = loops[:, :, None] + share * (np.roll(loops, -1, axis=1) - loops)[:, :, None]
-    size = np.linalg.norm(force(points.reshape(-1, 3)), axis=1).reshape(len(loops), -1) / stiffness
+    size = np.linalg.norm(force(points.reshape(-1, 3)), axis=1).reshape(len(loops), -1) / K
     return np.asarray(((size > 0.0) & (size < 0.1 / field.iz)).any(axis=1))
 
 
