@@ -21,9 +21,10 @@ counts at the factor in loops of 100 Hz to 10 kHz whose K₀ was tested at 1 kHz
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -219,22 +220,13 @@ def _random_axes(rng: np.random.Generator) -> np.ndarray:
     return np.linalg.qr(rng.standard_normal((3, 3)))[0]
 
 
-def admissible_loops(
-    law: str, seed: int, accepts: Callable[[float], bool]
-) -> Iterator[tuple[RandomLoop, float]]:
-    """Yield random loops of a law, with q of its surface, as long as they are asked for."""
-    number = 0
-    while True:
+def admissible_loops(law: str, seed: int) -> Iterator[tuple[RandomLoop, float]]:
+    """Yield random loops of a law that has a start to speak of, with q of its surface."""
+    for number in itertools.count():
         loop = random_loop(seed, number)
         q = characteristic_number(loop.surface(law), 0.05).value
-        if accepts(q):
+        if q <= MAX_GAIN:
             yield loop, q
-        number += 1
-
-
-def has_start(q: float) -> bool:
-    """Return whether a law of this q has a start to speak of."""
-    return q <= MAX_GAIN
 
 
 def lasting_motion(
@@ -328,7 +320,7 @@ def count_cycles(
             measures it.
         any_rate: whether the loops have update rates from 100 Hz to 10 kHz.
     """
-    loops = admissible_loops(law, seed, has_start)
+    loops = admissible_loops(law, seed)
 
     def motion(loop: RandomLoop, q: float) -> Motion | None:
         if any_rate:

@@ -15,7 +15,6 @@ from bench.stress.margins import (
     SEED,
     admissible_loops,
     count_cycles,
-    has_start,
     lasting_motion,
     random_loop,
     to_random_rate,
@@ -98,7 +97,7 @@ def test_damping_of_a_random_loop_is_that_of_its_wall_test() -> None:
 @pytest.mark.parametrize("letter", "CH")
 def test_no_loop_with_steps_moves_above_the_bound_of_its_steps(letter: str) -> None:
     """Encoders of 55 µm and forces of 10 mN: chatter that is felt, but below the bound."""
-    loops, steps, felt = admissible_loops(letter, 11, has_start), (55e-6, 10e-3), 0
+    loops, steps, felt = admissible_loops(letter, 11), (55e-6, 10e-3), 0
     for loop, q in (next(loops) for _ in range(30)):
         surface = loop.surface(letter).to_stiffness(0.3 * loop.lightest * loop.wall / q)
         data = {
