@@ -37,12 +37,12 @@ def textures() -> dict[str, Texture]:
     return {
         "sinusoid": Sinusoid(amplitude=0.4e-3, period=1.5e-3, phase=0.3, direction=(0.8, 0.6)),
         "fourier": Fourier(rng.uniform(0.02e-3, 0.06e-3, 8), waves, rng.uniform(0.0, 6.0, 8)),
-        "heightmap": HeightMap(_rough((256, 256), rng), pitch=50e-6),
-        "profile": Profile(_rough((1024,), rng), pitch=50e-6),
+        "heightmap": HeightMap(rough_heights((256, 256), rng), pitch=50e-6),
+        "profile": Profile(rough_heights((1024,), rng), pitch=50e-6),
     }
 
 
-def _rough(shape: tuple[int, ...], rng: np.random.Generator) -> FloatArray:
+def rough_heights(shape: tuple[int, ...], rng: np.random.Generator) -> FloatArray:
     """Return band-limited noise [m]: white noise through a Gaussian filter of six nodes."""
     from scipy.ndimage import gaussian_filter
 

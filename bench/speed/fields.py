@@ -33,7 +33,7 @@ def surfaces() -> dict[str, tuple[Texture, float]]:
     """Return textures by name, each with the resolution [m] of its field."""
     rng = np.random.default_rng(cases.SEED)
     result: dict[str, tuple[Texture, float]] = {
-        "map 1024 x 1024": (HeightMap(cases._rough((1024, 1024), rng), PITCH), PITCH),
+        "map 1024 x 1024": (HeightMap(cases.rough_heights((1024, 1024), rng), PITCH), PITCH),
         "cloth": (as_texture("cloth"), 20e-6),
         "needles 512 x 512": (ticks.adversarial_textures()["needles"][0], PITCH),
     }

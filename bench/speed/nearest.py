@@ -87,7 +87,7 @@ def run(console: Console) -> None:
 def _subjects() -> list[Subject]:
     known = cases.textures()
     rng = np.random.default_rng(cases.SEED)
-    rough = HeightMap(cases._rough((SIDE, SIDE), rng), pitch=50e-6)
+    rough = HeightMap(cases.rough_heights((SIDE, SIDE), rng), pitch=50e-6)
     noise = Noise(rms=0.1e-3, size=SIDE * 50e-6, pitch=50e-6, seed=1)
     subjects = []
     for name, texture in {**known, f"map {SIDE}": rough, f"noise {SIDE}": noise}.items():
