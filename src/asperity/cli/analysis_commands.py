@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from asperity.analysis.results.device_comparisons import DeviceComparisons, MissingData
     from asperity.devices import Device
     from asperity.laws import Law
-    from asperity.textures import Texture
 
 
 _BOUND_SEARCH = options.command_arguments("analyze")
@@ -58,22 +56,10 @@ def analyze_command(surface: str, device: Device | None, outputs: Outputs, **val
         texture, device, arguments = options.load_surface(surface, device, values)
         search = options.provided_values(values, _BOUND_SEARCH)
         result = analyze(texture, device, progress=step, **search, **arguments)
-    code = _texture_code(surface, options.file_values(values), texture)
 
     from asperity.report.pages.analysis_report import analysis_page
 
-    outputs.write(result, analysis_page(result, code))
-
-
-def _texture_code(source: str, file_options: Mapping[str, Any], texture: Texture) -> str:
-    """Return a Python expression that makes the texture; empty if its ``repr`` is one."""
-    if not repr(texture).startswith("<"):
-        return ""
-    if source.lower().endswith(".toml") or not os.path.exists(source):
-        extra = f", {dict(file_options)!r}" if file_options else ""
-        return f"load_scene({source!r}{extra}).texture"
-    arguments = [repr(source), *[f"{name}={value!r}" for name, value in file_options.items()]]
-    return f"asp.load_texture({', '.join(arguments)})"
+    outputs.write(result, analysis_page(result))
 
 
 _STIFFNESS = replace(

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from asperity.analysis.passivity.verdict import Passivity
 from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis
 from asperity.core.units import format_quantity
-from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
-from asperity.laws.clamps import NONE
 from asperity.report.document.page import (
     HEADED,
     NO_PERCEPTUAL_TEST,
@@ -62,7 +58,6 @@ from asperity.report.sentences.texts import (
     upper_bound_text,
     witness_text,
 )
-from asperity.surface import Surface
 
 _BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
 _CRITERIA_HEADINGS = ("criterion", "condition", "holds", "limit", "margin", "conclusion, premises")
@@ -184,15 +179,8 @@ def _jumps_table(analysis: Analysis) -> Table:
 # --- the page -------------------------------------------------------------------------------------
 
 
-def analysis_page(analysis: Analysis, texture_code: str = "") -> Page:
-    """Return the report: verdict, numbers, criteria, figures and assumptions.
-
-    Args:
-        analysis: the result.
-        texture_code: a Python expression of the texture; see
-            :func:`reproduction_lines`.
-    """
-    code = "\n".join(reproduction_lines(analysis, texture_code))
+def analysis_page(analysis: Analysis) -> Page:
+    """Return the report: verdict, numbers, criteria, figures and assumptions."""
     surface = analysis.surface
     name = analysis.device.name
     # The map of a profile shows no more than its section.
@@ -209,7 +197,6 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> Page:
             *_figure_sections(analysis, "field"),
             _continuity_section(analysis),
             Section("On a straight scan", [pairs_table(merit_facts(analysis))], media=_MEDIA),
-            Section("Reproduce q", [Paragraph(code, "code")], media=_MEDIA),
             *assumption_sections(
                 analysis.assumptions, device_numbers_table(analysis.device, PASSIVITY_FIELDS)
             ),
@@ -289,83 +276,3 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
         text = f"analysis.{name}"
         sections.append(figure_section(text, figure, (), 3, media, **values))
     return sections
-
-
-# --- Python code that reproduces q ----------------------------------------------------------------
-
-# Distance from the onset of the medial axis, as a fraction of the distance to the surface.
-_ONSET_OFFSET = 1e-6
-_UNBOUNDED_TEXT = "grows without bound towards the onset"
-
-
-def reproduction_lines(analysis: Analysis, texture_code: str = "") -> list[str]:
-    """Return three lines of Python that evaluate ‖J‖/k where it attains q.
-
-    Where q is infinite they evaluate it just above the onset, where it is large.
-
-    Args:
-        analysis: the result.
-        texture_code: an expression of the texture; by default its ``repr`` if that is one.
-    """
-    surface = analysis.surface
-    lines = ["import asperity as asp, numpy as np"]
-    if "load_scene(" in texture_code:
-        lines[0] += "; from asperity.scene import load_scene"
-    texture = _texture_expression(surface, texture_code)
-    lines.append(f"s = asp.Surface({texture}, {_surface_arguments(surface)})")
-    evaluation = _evaluate_witness(analysis)
-    if evaluation is None:
-        q = interval_text(analysis.q)
-        return [*lines, f"print(asp.characteristic_number(s))  # {q}, {analysis.q.method}"]
-    point, value, remark = evaluation
-    arguments = f"[{[float(v) for v in point]}]"
-    if analysis.q.deflection is not None:
-        deflection = list(analysis.q.deflection)
-        arguments += f", [{deflection}], np.array([{analysis.q.sliding}])"
-    call = f"np.linalg.norm(s.jacobian({arguments})[0], 2) / s.stiffness"
-    return [*lines, f"print({call})  # {value:.12g}{remark}"]
-
-
-def _evaluate_witness(analysis: Analysis) -> tuple[np.ndarray, float, str] | None:
-    """Return the point of the evaluation, its value and a remark; ``None`` without a witness."""
-    surface = analysis.surface
-    q = analysis.q
-    if q.at is None:
-        return None
-    at = np.array(q.at)
-    remark = ""
-    if math.isinf(q.lower):
-        closest = surface.texture.nearest(at[None])[0]
-        at = at + _ONSET_OFFSET * (closest - at)
-        remark = f": {_UNBOUNDED_TEXT}"
-    state = () if q.deflection is None else (np.array([q.deflection]), np.array([q.sliding]))
-    jacobian = surface.jacobian(at[None], *state)[0]
-    return at, float(np.linalg.norm(jacobian, 2)) / surface.stiffness, remark
-
-
-def _texture_expression(surface: Surface, texture_code: str) -> str:
-    if texture_code:
-        return texture_code
-    written = repr(surface.texture)
-    return "texture" if written.startswith("<") else f"asp.{written}"
-
-
-def _surface_arguments(surface: Surface) -> str:
-    law = surface.law
-    is_shipped = LAWS.get(law.letter) is law
-    parts = [repr(law.letter) if is_shipped else "law"]
-    parts += [f"stiffness={surface.stiffness!r}", f"max_depth={surface.max_depth!r}"]
-    parts += [f"{name}={value!r}" for name, value in surface.friction_values.items()]
-    others = {}
-    for name, value in surface.law_parameters.items():
-        if value == law.parameters[name]:
-            continue
-        if name in SHIPPED_LAW_ARGUMENTS:
-            parts.append(f"{name}={value!r}")
-        else:
-            others[name] = value
-    if others:
-        parts.append(f"law_parameters={others!r}")
-    if surface.clamp != NONE.name:
-        parts.append(f"clamp={surface.clamp!r}")
-    return ", ".join(parts)
