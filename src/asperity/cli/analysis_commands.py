@@ -247,10 +247,11 @@ def envelope_command(
     the texture is felt at that stiffness on a scan, as in asperity compare.
     """
     from asperity.envelopes.envelope import envelope, textured_laws
-    from asperity.report.pages.limits_report import check_suffix, envelope_page, write_envelope
+    from asperity.report.document.page import check_suffix
+    from asperity.report.pages.limits_report import TABLE_SUFFIX, envelope_page, write_envelope
 
     for path in output:
-        check_suffix(path)
+        check_suffix(path, TABLE_SUFFIX)
     check_outputs(force=outputs.force, **{f"output {i}": path for i, path in enumerate(output, 1)})
     devices = [
         values["settings"].apply_to(entry) for entry in device or options.parse_devices("omega.3")

@@ -184,12 +184,11 @@ class Outputs:
         if self.json is not None:
             write_output("json", self.json, json_text(data))
         if self.html is not None:
-            from asperity.report.document.html import Origin, render_page
+            from asperity.report.document.html import render_page
 
             command_line = escape_unprintable(shlex.join(["asperity", *sys.argv[1:]]))
-            origin = Origin(command_line, text_digest(json_text(data)))
             with progress_bar("drawing the report"):
-                text = render_page(page, origin)
+                text = render_page(page, text_digest(json_text(data)), command_line)
             write_output("html", self.html, text)
         if self.latex is not None:
             from asperity.report.document.latex import render_latex

@@ -6,13 +6,16 @@ with :func:`set_renderer`, and it is loaded at the first use.
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
+from functools import cached_property
+from typing import IO, TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from asperity.core.errors import ParameterError
-from asperity.core.files import write_bytes
+from asperity.core.files import open_atomic, write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -180,3 +183,65 @@ class Tabular(ABC):
             requirement = "needs pandas: pip install pandas; or use table_rows()"
             raise ParameterError("to_dataframe", requirement) from None
         return pandas.DataFrame(self.table_rows())
+
+
+class TableFiles(Tabular):
+    """A result whose table is written as CSV."""
+
+    @abstractmethod
+    def iterate_rows(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of :meth:`table_rows`, without the columns that a row lacks."""
+
+    @cached_property
+    def columns(self) -> dict[str, type]:
+        """Columns of the table with the type of their values: bool, int, float or str."""
+        return self._column_types()
+
+    def _column_types(self) -> dict[str, type]:
+        types: dict[str, set[type]] = {}
+        for row in self.iterate_rows():
+            for name, value in row.items():
+                types.setdefault(name, set()).update({type(value)} - {type(None)})
+        return {name: _common_type(kinds or {str}) for name, kinds in types.items()}
+
+    def table_rows(self) -> list[dict[str, Any]]:
+        """Return the rows in their order; SI units. An unknown value is ``None``."""
+        return [{name: row.get(name) for name in self.columns} for row in self.iterate_rows()]
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the table as CSV, whose first line names the columns with their units.
+
+        Raises:
+            ParameterError: if the file cannot be written.
+        """
+        try:
+            with open_atomic(path) as stream:
+                self._write_csv(stream)
+        except OSError as error:
+            raise ParameterError(
+                "output", f"cannot be written: {error.strerror}", str(path)
+            ) from None
+
+    def _write_csv(self, stream: IO[bytes]) -> None:
+        text = io.TextIOWrapper(stream, "utf-8", newline="", write_through=True)
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.columns)
+        for row in self.iterate_rows():
+            writer.writerow([_csv_value(row.get(name)) for name in self.columns])
+        text.detach()
+
+
+def _common_type(types: set[type]) -> type:
+    """Return the type of a column from those of its values."""
+    if types == {int, float}:
+        return float
+    if len(types) == 1:
+        return types.pop()
+    return str
+
+
+def _csv_value(value: Any) -> Any:
+    """Return a value of CSV: true and false as in JSON."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -16,7 +16,7 @@ from asperity.analysis.limits.limit_rules import LIMIT_RULES, shortest_wavelengt
 from asperity.analysis.limits.spectrum import MIN_SHARE, Wave, compute_spectrum
 from asperity.analysis.results.compare import DEFAULT_DEVICE, Progress, lacks_data
 from asperity.core.checks import check_array, check_items
-from asperity.core.display import Plottable, Reportable, Tabular, Text
+from asperity.core.display import Plottable, Reportable, TableFiles, Text
 from asperity.core.errors import ParameterError
 from asperity.core.files import OMITTED, Serializable, to_plain_data, written
 from asperity.core.processes import precompute
@@ -153,7 +153,7 @@ class SurfacePeaks(Serializable):
 
 
 @dataclass(frozen=True)
-class Envelope(Plottable, Reportable, Tabular):
+class Envelope(Plottable, Reportable, TableFiles):
     """The sinusoids that devices render: borders by device, law and wavelength.
 
     Attributes:
@@ -175,9 +175,9 @@ class Envelope(Plottable, Reportable, Tabular):
         regions = [f"{part.device.id}: law {part.widest.letter} widest" for part in self.devices]
         return f"<Envelope, {'; '.join(regions)}>"
 
-    def table_rows(self) -> list[dict[str, Any]]:
-        """Return a row per device, law and wavelength; SI units, ``None`` where there is none."""
-        return [
+    def iterate_rows(self) -> Iterator[dict[str, Any]]:
+        """Yield a row per device, law and wavelength; SI units, ``None`` where there is none."""
+        yield from [
             {"device": part.device.id, "law": law.letter} | _border_row(border)
             for part in self.devices
             for law in part.laws

@@ -22,7 +22,7 @@ from asperity.devices import Device
 from asperity.envelopes.envelope import Envelope
 from asperity.envelopes.find_design import Design
 from asperity.measured.reading.measured_file import MeasurementSummary
-from asperity.report.document.html import Origin, render_notebook, render_page
+from asperity.report.document.html import render_notebook, render_page
 from asperity.report.document.latex import render_latex
 from asperity.report.document.page import Page, Picture, notebook_page, plot_later
 from asperity.report.document.terminal import page_renderables
@@ -131,7 +131,7 @@ def html_text(result: Any) -> str:
     page = find_page(result)
     if page is None or not page.title:
         raise TypeError(f"a {type(result).__name__} has no report")
-    return render_page(page, Origin(content=text_digest(json_text(result))))
+    return render_page(page, text_digest(json_text(result)))
 
 
 def latex_text(result: Any) -> str:

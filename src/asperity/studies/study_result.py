@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from asperity.core.display import Reportable
+from asperity.core.display import Reportable, TableFiles
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import count_text
 from asperity.studies.design import StudyDesign, TrialRecord, describe_source
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.studies.scores import Interval, Score
-from asperity.sweeps.sweep_result import TableFiles
 
 SCHEMA = 1
 POOLED = "pooled"

@@ -7,33 +7,22 @@ opened again. The rows of a table need not be in memory at once.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import os
 import re
 import weakref
-from abc import abstractmethod
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from filelock import FileLock, Timeout
 
-from asperity.core.display import Reportable, Tabular
+from asperity.core.display import Reportable, TableFiles
 from asperity.core.errors import ParameterError
-from asperity.core.files import (
-    append_bytes,
-    json_text,
-    open_atomic,
-    open_input,
-    to_plain_data,
-    write_bytes,
-)
+from asperity.core.files import append_bytes, json_text, open_input, to_plain_data, write_bytes
 from asperity.core.processes import defer_interrupt
 from asperity.sweeps.case_runs import Outcome, RunKind, find_run
 from asperity.sweeps.sweep_plan import SweepPlan
@@ -45,68 +34,6 @@ ERROR = "error"
 
 UNIT = re.compile(r"(.*) \[(.+)\]")
 """Name and unit of a column."""
-
-
-class TableFiles(Tabular):
-    """A result whose table is written as CSV."""
-
-    @abstractmethod
-    def iterate_rows(self) -> Iterator[dict[str, Any]]:
-        """Yield the rows of :meth:`table_rows`, without the columns that a row lacks."""
-
-    @cached_property
-    def columns(self) -> dict[str, type]:
-        """Columns of the table with the type of their values: bool, int, float or str."""
-        return self._column_types()
-
-    def _column_types(self) -> dict[str, type]:
-        types: dict[str, set[type]] = {}
-        for row in self.iterate_rows():
-            for name, value in row.items():
-                types.setdefault(name, set()).update({type(value)} - {type(None)})
-        return {name: _common_type(kinds or {str}) for name, kinds in types.items()}
-
-    def table_rows(self) -> list[dict[str, Any]]:
-        """Return the rows in their order; SI units. An unknown value is ``None``."""
-        return [{name: row.get(name) for name in self.columns} for row in self.iterate_rows()]
-
-    def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write the table as CSV, whose first line names the columns with their units.
-
-        Raises:
-            ParameterError: if the file cannot be written.
-        """
-        try:
-            with open_atomic(path) as stream:
-                self._write_csv(stream)
-        except OSError as error:
-            raise ParameterError(
-                "output", f"cannot be written: {error.strerror}", str(path)
-            ) from None
-
-    def _write_csv(self, stream: IO[bytes]) -> None:
-        text = io.TextIOWrapper(stream, "utf-8", newline="", write_through=True)
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.columns)
-        for row in self.iterate_rows():
-            writer.writerow([_csv_value(row.get(name)) for name in self.columns])
-        text.detach()
-
-
-def _common_type(types: set[type]) -> type:
-    """Return the type of a column from those of its values."""
-    if types == {int, float}:
-        return float
-    if len(types) == 1:
-        return types.pop()
-    return str
-
-
-def _csv_value(value: Any) -> Any:
-    """Return a value of CSV: true and false as in JSON."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return value
 
 
 @dataclass(frozen=True, eq=False)

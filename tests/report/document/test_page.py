@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from tests.report.report_pages import Reader, check_alone
 
 from asperity.report import html_text
-from asperity.report.document.html import Origin, render_page
+from asperity.report.document.html import render_page
 from asperity.report.document.page import (
     BulletList,
     Cards,
@@ -39,7 +39,7 @@ def all_blocks(text: str) -> list[Section]:
         Paragraph(text, "mono"),
         BulletList([text]),
         DefinitionList([(text, text)]),
-        Picture(Figure((1.0, 1.0)), text),
+        Picture(lambda: Figure((1.0, 1.0)), text),
         table,
         Cards([Section(text, [table], level=3, id="card")]),
     ]
@@ -68,7 +68,7 @@ def test_all_texts_are_escaped() -> None:
 
 
 def test_command_in_the_footer_is_escaped() -> None:
-    page_ = render_page(Page("title", "answer", [], []), Origin(f"asperity '{HOSTILE}'", "abc"))
+    page_ = render_page(Page("title", "answer", [], []), "abc", f"asperity '{HOSTILE}'")
     assert HOSTILE not in page_
     assert "content abc" in check_alone(page_).text
 

@@ -26,19 +26,6 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Origin:
-    """Origin of a page.
-
-    Attributes:
-        command: the command line that wrote it, as a shell takes it; empty from Python.
-        content: digest of the result, see :func:`asperity.core.files.text_digest`; may be empty.
-    """
-
-    command: str = ""
-    content: str = ""
-
-
-@dataclass(frozen=True)
 class RenderedPicture:
     """A figure as it is embedded in a page.
 
@@ -98,12 +85,13 @@ def _pictures_in(sections: Sequence[pages.Section]) -> Iterator[pages.Picture]:
                 yield from _pictures_in(block.sections)
 
 
-def render_page(page: pages.Page, origin: Origin | None = None) -> str:
+def render_page(page: pages.Page, digest: str = "", command: str = "") -> str:
     """Return a page as HTML that loads nothing, for light and dark screens and print.
 
     Args:
         page: the page.
-        origin: of the result, for the footer.
+        digest: of the result, see :func:`asperity.core.files.text_digest`; may be empty.
+        command: the command line that wrote it, as a shell takes it; empty from Python.
     """
     # Insignificant white space only makes pages larger.
     style = re.sub(r"\s*([{};])\s*", r"\1", _read_template("style.css"))
@@ -120,7 +108,8 @@ def render_page(page: pages.Page, origin: Origin | None = None) -> str:
         script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         version=__version__,
         date=_build_date(),
-        origin=origin or Origin(),
+        digest=digest,
+        command=command,
     )
 
 

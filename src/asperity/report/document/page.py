@@ -6,14 +6,15 @@ it as an HTML file or as the output of a notebook cell.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Flag, auto
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from asperity.core.errors import ParameterError
 from asperity.report.sentences.texts import figure_text, yes_no_text
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ class Picture:
     """A figure, drawn only by a renderer that shows it.
 
     Attributes:
-        figure: the figure, or a function that draws it.
+        draw: returns the figure.
         description: what the figure shows, in a sentence or two for readers who cannot see it, or
             a function that returns it; the ranges of lines and colours are appended.
         name: namespace of the rendered figure in the cache.
@@ -84,15 +85,11 @@ class Picture:
     """
 
     block_type: ClassVar[str] = "picture"
-    figure: Figure | Callable[[], Figure]
+    draw: Callable[[], Figure]
     description: str | Callable[[], str]
     name: str = ""
     find_digest: Callable[[], str | None] | None = None
     dpi: int = 160
-
-    def draw(self) -> Figure:
-        """Return the figure."""
-        return self.figure() if callable(self.figure) else self.figure
 
     def describe(self) -> str:
         """Return what the figure shows."""
@@ -289,7 +286,7 @@ def _plot(result: Any, picture: str | None) -> Figure:
 
 def picture_section(
     title: str,
-    figure: Figure | Callable[[], Figure],
+    draw: Callable[[], Figure],
     description: str,
     caption: str = "",
     notes: Sequence[str] = (),
@@ -297,12 +294,12 @@ def picture_section(
     media: Media = Media.HTML,
 ) -> Section:
     """Return a section that shows a figure; see :class:`Picture`."""
-    return Section(title, [Picture(figure, description)], caption, notes, level, media=media)
+    return Section(title, [Picture(draw, description)], caption, notes, level, media=media)
 
 
 def figure_section(
     name: str,
-    figure: Figure | Callable[[], Figure],
+    draw: Callable[[], Figure],
     notes: Sequence[str] = (),
     level: int = 2,
     media: Media = Media.HTML,
@@ -312,14 +309,14 @@ def figure_section(
 
     Args:
         name: of the texts; see :func:`asperity.report.sentences.texts.figure_text`.
-        figure: see :class:`Picture`.
+        draw: see :class:`Picture`.
         notes: below the figure.
         level: see :class:`Section`.
         media: where it is shown.
         values: that replace the names in braces in the texts.
     """
     title, caption, description = figure_text(name, **values)
-    return picture_section(title, figure, description, caption, notes, level, media)
+    return picture_section(title, draw, description, caption, notes, level, media)
 
 
 def facts_section(facts: Sequence[tuple[str, str]]) -> Section:
@@ -372,11 +369,24 @@ FIGURE_SUFFIXES = (".svg", ".png", ".pdf")
 """Suffixes of the files to which figures are written."""
 
 
+def check_suffix(path: str, other: str) -> str:
+    """Return the suffix of the file of a figure, or the other one.
+
+    Raises:
+        ParameterError: for another suffix.
+    """
+    suffix = Path(path).suffix.lower()
+    suffixes = (other, *FIGURE_SUFFIXES)
+    if suffix not in suffixes:
+        raise ParameterError("output", f"must end in {', '.join(suffixes)}", path)
+    return suffix
+
+
 def figure_bytes(result: Any, suffix: str) -> bytes:
-    """Return the main figure of a result as the content of a file with one of these suffixes."""
-    image = io.BytesIO()
+    """Return the main figure of a result as the content of a file of a suffix."""
+    from asperity.report.pictures.style import to_bytes
+
     # Without a date, the same result gives the same file.
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix)
     with default_style():
-        _plot(result, None).savefig(image, format=suffix[1:], metadata=metadata)
-    return image.getvalue()
+        return to_bytes(_plot(result, None), format=suffix[1:], metadata=metadata)

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from pathlib import Path
-
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, Limit
 from asperity.analysis.results import check_limits
-from asperity.core.errors import ParameterError
 from asperity.core.files import write_bytes
 from asperity.core.units import format_quantity
 from asperity.envelopes.envelope import LISTED, DeviceEnvelope, Envelope
 from asperity.report.document.page import (
-    FIGURE_SUFFIXES,
     NO_PERCEPTUAL_TEST,
     PAPER_CITATION,
     SCREEN,
@@ -28,6 +22,7 @@ from asperity.report.document.page import (
     Table,
     TableLayout,
     assumption_sections,
+    check_suffix,
     figure_bytes,
     figure_section,
     holds_cell,
@@ -191,8 +186,8 @@ def _waves_sections(result: check_limits.Limits) -> list[Section]:
 
 
 _ALL = SCREEN | Media.HEADING
-SUFFIXES = (".csv", *FIGURE_SUFFIXES)
-"""Suffixes of the files to which an envelope is written."""
+TABLE_SUFFIX = ".csv"
+"""Suffix of the file to which the borders of an envelope are written."""
 
 
 def envelope_page(result: Envelope) -> Page:
@@ -266,22 +261,8 @@ def write_envelope(result: Envelope, path: str) -> None:
     Raises:
         ParameterError: for another suffix, or a file that cannot be written.
     """
-    suffix = check_suffix(path)
-    if suffix in FIGURE_SUFFIXES:
-        content = figure_bytes(result, suffix)
+    suffix = check_suffix(path, TABLE_SUFFIX)
+    if suffix == TABLE_SUFFIX:
+        result.to_csv(path)
     else:
-        text = io.StringIO()
-        rows = result.table_rows()
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        content = text.getvalue().encode()
-    write_bytes("output", path, content)
-
-
-def check_suffix(path: str) -> str:
-    """Return the suffix of a path, checked."""
-    suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ParameterError("output", f"must end in {', '.join(SUFFIXES)}", path)
-    return suffix
+        write_bytes("output", path, figure_bytes(result, suffix))

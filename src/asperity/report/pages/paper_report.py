@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -49,6 +48,7 @@ from asperity.report.document.page import (
 from asperity.report.pages import sweep_report
 from asperity.report.pictures import paper_pictures
 from asperity.report.pictures.loop_pictures import onset_figure
+from asperity.report.pictures.style import to_bytes
 from asperity.report.sentences.paper_text import (
     VERDICT_TEXTS,
     evidence_text,
@@ -444,6 +444,4 @@ def write_figures(
 def _draw_image(figure: Figure, file_format: str) -> bytes:
     metadata: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
     options: dict[str, Any] = {"dpi": _DPI, "bbox_inches": "tight", "pad_inches": _MARGIN}
-    image = io.BytesIO()
-    figure.savefig(image, format=file_format, metadata=metadata[file_format], **options)
-    return image.getvalue()
+    return to_bytes(figure, format=file_format, metadata=metadata[file_format], **options)

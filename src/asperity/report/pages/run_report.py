@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from asperity.core.checks import FloatArray
-from asperity.core.errors import ParameterError, escape_unprintable
+from asperity.core.errors import escape_unprintable
 from asperity.core.files import json_text, text_digest, write_bytes
 from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
 from asperity.recording.recording import Recording, open_recording
 from asperity.recording.replay import Replay
-from asperity.report.document.html import Origin, render_page
+from asperity.report.document.html import render_page
 from asperity.report.document.page import (
-    FIGURE_SUFFIXES,
     PAPER_CITATION,
     SCREEN,
     Media,
@@ -27,6 +25,7 @@ from asperity.report.document.page import (
     Table,
     TableLayout,
     assumption_sections,
+    check_suffix,
     facts_section,
     figure_bytes,
     figure_section,
@@ -248,12 +247,10 @@ def write_recording_report(recording: Recording, path: str) -> None:
         ParameterError: for another suffix, a recording without enough rows, or a file that cannot
             be written.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".html", *FIGURE_SUFFIXES):
-        raise ParameterError("output", f"must end in .html, {', '.join(FIGURE_SUFFIXES)}", path)
+    suffix = check_suffix(path, ".html")
     if suffix == ".html":
-        origin = Origin(content=text_digest(json_text(recording)))
-        content = render_page(recording_page(recording), origin).encode()
+        digest = text_digest(json_text(recording))
+        content = render_page(recording_page(recording), digest).encode()
     else:
         content = figure_bytes(recording, suffix)
     write_bytes("output", path, content)

@@ -119,11 +119,16 @@ class NotebookFigure(Figure):
         return to_png(self)
 
 
+def to_bytes(figure: Figure, **options: Any) -> bytes:
+    """Return a figure as the content of a file; options are those of Matplotlib."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, **options)
+    return buffer.getvalue()
+
+
 def to_png(figure: Figure) -> bytes:
     """Return a figure as PNG: 720 pixels for its 10 inches."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=72)
-    return buffer.getvalue()
+    return to_bytes(figure, format="png", dpi=72)
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -312,10 +317,8 @@ def svg_text(figure: Figure, dpi: int = 160) -> str:
         figure: the figure.
         dpi: resolution of rasterized parts.
     """
-    buffer = io.BytesIO()
     options: dict[str, Any] = {"facecolor": BACKGROUND, "metadata": {"Date": None, "Creator": None}}
-    figure.savefig(buffer, format="svg", dpi=dpi, **options)
-    text = buffer.getvalue().decode("utf-8")
+    text = to_bytes(figure, format="svg", dpi=dpi, **options).decode("utf-8")
     # A page needs no prologue, metadata, comments or indentation.
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = re.sub(r"\n *", "\n", re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)).strip()
