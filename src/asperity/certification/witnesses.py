@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -138,16 +138,12 @@ class BaselineDifference:
         before: in the baseline, SI units.
         now: of the renderer.
         at: position of a force [m].
-        heights: z of all positions of the baseline [m], shape (n,); none for other quantities.
-        changes: greatest change of a component of the force at each [N], shape (n,).
     """
 
     quantity: str
     before: Any
     now: Any
     at: tuple[float, ...] | None = None
-    heights: FloatArray = field(default_factory=lambda: np.empty(0))
-    changes: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
 def compare_baseline(
@@ -174,14 +170,8 @@ def compare_baseline(
     changed = np.flatnonzero(~(changes <= tolerance + result.resolution.force_error))
     if len(changed):
         first = int(changed[0])
-        return BaselineDifference(
-            "force",
-            forces[first].tolist(),
-            now[first].tolist(),
-            tuple(points[first].tolist()),
-            points[:, 2],
-            changes,
-        )
+        at = tuple(points[first].tolist())
+        return BaselineDifference("force", forces[first].tolist(), now[first].tolist(), at)
     current = make_baseline(calls, result)
     for name, before in limits.items():
         if current[name] > (1.0 + _GAIN_TOLERANCE) * before + 1e-12:

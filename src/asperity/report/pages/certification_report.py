@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from asperity.certification.certify import Certification
+from asperity.certification.loop_search import ClosedLoop
 from asperity.certification.recorded_loop import RecordedCertification
 from asperity.certification.witnesses import BaselineDifference
 from asperity.core.units import format_quantity
@@ -54,16 +55,12 @@ def certification_page(
     if difference is not None:
         answer = f"It differs from the baseline. {difference_sentence(difference)} {answer}"
     sections = [Section("What was found", [_findings_table(result)], media=SCREEN)]
-    if difference is not None and len(difference.changes):
-        text = "Change of the force since the baseline, against the height of its positions."
-        picture = Picture(partial(_difference_figure, difference), text)
-        sections.append(Section("Changes of the force", [picture]))
     if device is not None:
         texts = [Paragraph(text) for text in device_sentences(result, device)]
         sections.append(Section("On the device", texts, media=SCREEN))
     if result.worst_loop is not None:
         text = "The closed path that gains most energy; the force does work along it."
-        picture = Picture(partial(_loop_figure, result), text)
+        picture = Picture(partial(_loop_figure, result.worst_loop), text)
         sections.append(Section("The worst loop", [picture]))
     if result.jumps:
         sections.append(Section("Jumps", [_jumps_table(result)]))
@@ -148,16 +145,10 @@ def _jumps_table(result: Certification) -> Table:
     return Table(("size", "over", "where"), rows)
 
 
-def _difference_figure(difference: BaselineDifference) -> Figure:
-    from asperity.report.pictures.certification_pictures import difference_figure
-
-    return difference_figure(difference)
-
-
-def _loop_figure(result: Certification) -> Figure:
+def _loop_figure(loop: ClosedLoop) -> Figure:
     from asperity.report.pictures.certification_pictures import loop_figure
 
-    return loop_figure(result)
+    return loop_figure(loop)
 
 
 def replay_page(rows: Sequence[dict[str, Any]]) -> Page:

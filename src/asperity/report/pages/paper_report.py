@@ -193,10 +193,12 @@ def paper_sections() -> list[Section]:
 
 def experiment_sections(experiments: Experiments) -> list[Section]:
     """Return the sections of the experiments in order."""
+    onsets = experiments.passivity.onsets
+    figure = partial(onset_figure, onsets)
     return [
         _cycle_section(experiments.passivity),
-        sweep_report.onset_figure_section("paper.onsets", experiments.passivity.onsets),
-        sweep_report.onset_section("V.A, onsets in numbers", experiments.passivity.onsets),
+        sweep_report.onset_figure_section("paper.onsets", figure, onsets),
+        sweep_report.onset_section("V.A, onsets in numbers", onsets),
         _energy_section(experiments.scanning),
         _stroke_section(experiments.scanning),
         _bump_section(experiments.bump),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import TYPE_CHECKING
 
 from asperity.core.checks import FloatArray
@@ -11,7 +10,7 @@ from asperity.core.errors import escape_unprintable
 from asperity.core.files import json_text, text_digest, write_bytes
 from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
-from asperity.recording.recording import Recording, open_recording
+from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
 from asperity.report.document.html import render_page
 from asperity.report.document.page import (
@@ -54,7 +53,6 @@ from asperity.servo.calibration.measured_device import format_uncertainty
 from asperity.servo.loop_memory import EndReason
 from asperity.servo.process import ServoProcess
 from asperity.simulation import Run
-from asperity.simulation.trace import MAX_ROWS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -154,14 +152,7 @@ def figure_sections(run: Run) -> list[Section]:
         return []
     end = f". At the end the texture has supplied {energy_text(run.ledger.total)}"
     media = Media.HTML | Media.NOTEBOOK if len(run.time) > 1 else Media.HTML
-    return [_motion_section(partial(_draw_run, run), run.duration, end, media)]
-
-
-def _draw_run(run: Run) -> Figure:
-    from asperity.report.pictures.loop_pictures import run_figure
-
-    traced = open_recording(run.path).to_columns(MAX_ROWS) if run.path else run
-    return run_figure(traced, run.surface.texture.height)
+    return [_motion_section(plot_later(run), run.duration, end, media)]
 
 
 def _motion_section(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial, singledispatch
 from operator import itemgetter
@@ -115,7 +115,7 @@ def onset_page(result: OnsetSweep) -> Page:
         facts=loop_facts(setup),
         sections=[
             replace(in_numbers, title="", caption="", media=Media.TERMINAL),
-            onset_figure_section("loop.onsets", predictions),
+            onset_figure_section("loop.onsets", page.plot_later(result), predictions),
             in_numbers,
             *page.assumption_sections(setup.assumptions),
         ],
@@ -123,16 +123,12 @@ def onset_page(result: OnsetSweep) -> Page:
     )
 
 
-def onset_figure_section(name: str, predictions: Sequence[Prediction]) -> Section:
+def onset_figure_section(
+    name: str, draw: Callable[[], Figure], predictions: Sequence[Prediction]
+) -> Section:
     """Return the figure of the onsets with the texts of a name."""
     laws = ", ".join(dict.fromkeys([prediction.onset.law for prediction in predictions]))
-    return page.figure_section(name, partial(_draw_onsets, predictions), laws=laws)
-
-
-def _draw_onsets(predictions: Sequence[Prediction]) -> Figure:
-    from asperity.report.pictures.loop_pictures import onset_figure
-
-    return onset_figure(predictions)
+    return page.figure_section(name, draw, laws=laws)
 
 
 def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
@@ -184,18 +180,12 @@ def strokes_page(result: StrokeSweep) -> Page:
         facts=loop_facts(setup),
         sections=[
             page.terminal_section(table, notes=notes),
-            page.figure_section("loop.strokes", partial(_draw_strokes, strokes), laws=laws),
+            page.figure_section("loop.strokes", page.plot_later(result), laws=laws),
             Section("In numbers", [table], notes=[note]),
             *page.assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,
     )
-
-
-def _draw_strokes(strokes: Sequence[Stroke]) -> Figure:
-    from asperity.report.pictures.loop_pictures import strokes_figure
-
-    return strokes_figure(strokes)
 
 
 _HEADINGS = ("number", "of", "least", "at", "greatest", "at")

@@ -7,36 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from asperity.certification.certify import Certification
+from asperity.certification.loop_search import ClosedLoop
 from asperity.certification.recorded_loop import RecordedCertification
-from asperity.certification.witnesses import BaselineDifference
 from asperity.report.pictures import style
 
 _MAX_POINTS = 4000
 _AXIS_COLOURS = (style.ORANGE, style.GREEN, style.BLUE)
 
 
-def loop_figure(result: Certification) -> Figure:
+def loop_figure(loop: ClosedLoop) -> Figure:
     """Return the worst loop in the plane of its longest horizontal extent and the height."""
     figure = style.new_figure(7.0, 4.0)
     axes = style.single_axes(figure)
-    loop = result.worst_loop
-    if loop is None:
-        return figure
     path = np.concatenate([loop.path, loop.path[:1]])
     axis = int(np.argmax(np.ptp(path[:, :2], axis=0)))
     unit = style.length_unit(float(np.ptp(path, axis=0).max()))
     axes.plot(path[:, axis] * unit.scale, path[:, 2] * unit.scale, color=style.ORANGE)
     style.label_axes(axes, f"{'xy'[axis]} [{unit.name}]", f"z [{unit.name}]")
-    return figure
-
-
-def difference_figure(difference: BaselineDifference) -> Figure:
-    """Return the changes of the force since a baseline against the height."""
-    figure = style.new_figure(7.0, 3.5)
-    axes = style.single_axes(figure)
-    axes.plot(1e3 * difference.heights, 1e3 * difference.changes, ".", color=style.ORANGE)
-    style.label_axes(axes, "z [mm]", "change of force [mN]")
     return figure
 
 

@@ -13,7 +13,7 @@ from asperity.analysis.results.check_limits import Limits
 from asperity.analysis.results.compare import Comparison
 from asperity.core.errors import ParameterError
 from asperity.envelopes.envelope import Envelope
-from asperity.recording.recording import Recording
+from asperity.recording.recording import Recording, open_recording
 from asperity.report.pictures import law_pictures, style
 from asperity.report.pictures.analysis_pictures import available_pictures
 from asperity.report.pictures.device_pictures import (
@@ -23,10 +23,17 @@ from asperity.report.pictures.device_pictures import (
     risk_figure,
     spectrum_figure,
 )
-from asperity.report.pictures.loop_pictures import recording_figure, run_figure
+from asperity.report.pictures.loop_pictures import (
+    onset_figure,
+    recording_figure,
+    run_figure,
+    strokes_figure,
+)
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size
 from asperity.report.sentences.comparison_sentences import conservation_remarks
+from asperity.scene.sweeps import OnsetSweep, StrokeSweep
 from asperity.simulation import Run
+from asperity.simulation.trace import MAX_ROWS
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -61,8 +68,10 @@ def plot(result: Any, picture: str | None = None) -> Figure:
         >>> [axes.get_ylabel() for axes in plot(Sinusoid(0.4e-3, 1.5e-3)).axes]
         ['height [mm]']
     """
-    del picture  # used by the registered functions
-    raise TypeError(f"a {type(result).__name__} has no figure")
+    if type(result) not in _SINGLE_FIGURES:
+        raise TypeError(f"a {type(result).__name__} has no figure")
+    _check_picture_name(picture)
+    return _SINGLE_FIGURES[type(result)](result)
 
 
 @plot.register
@@ -97,29 +106,12 @@ def _plot_analysis(result: Analysis, picture: str | None = None) -> Figure:
 
 
 @plot.register
-def _plot_limits(result: Limits, picture: str | None = None) -> Figure:
-    _check_picture_name(picture)
-    return limits_figure(result)
-
-
-@plot.register
-def _plot_envelope(result: Envelope, picture: str | None = None) -> Figure:
-    _check_picture_name(picture)
-    return envelope_figure(result)
-
-
-@plot.register
 def _plot_run(result: Run, picture: str | None = None) -> Figure:
     _check_picture_name(picture)
-    if len(result.time) < 2:
+    traced = open_recording(result.path).to_columns(MAX_ROWS) if result.path else result
+    if len(traced.time) < 2:
         raise ParameterError("trace", "must be kept in memory to be drawn")
-    return run_figure(result, result.surface.texture.height)
-
-
-@plot.register
-def _plot_recording(result: Recording, picture: str | None = None) -> Figure:
-    _check_picture_name(picture)
-    return recording_figure(result)
+    return run_figure(traced, result.surface.texture.height)
 
 
 def _texture_drawing(texture: Texture) -> style.SizedDrawing:
@@ -157,6 +149,15 @@ def _check_picture_name(picture: str | None, *names: str) -> None:
         allowed = f"one of {', '.join(names)}" if names else "left out for this result"
         raise ParameterError("picture", f"must be {allowed}", picture)
 
+
+# Results with one figure.
+_SINGLE_FIGURES: dict[type, Callable[[Any], Figure]] = {
+    Envelope: envelope_figure,
+    Limits: limits_figure,
+    OnsetSweep: lambda result: onset_figure(result.onsets),
+    Recording: recording_figure,
+    StrokeSweep: lambda result: strokes_figure(result.strokes),
+}
 
 # The figures of a comparison in its report.
 COMPARISON_PICTURES: dict[str, Callable[[Comparison], Figure]] = {
