@@ -3,55 +3,60 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.field_energy import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.display import Displayable
-from asperity.core.files import Serializable, written
+from asperity.core.files import OMITTED, Serializable, written
 from asperity.paper.cases import PAPER_CASE, PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH
 
 _ENERGY_TOLERANCE = 1e-9  # relative to k A²
 
 
-@dataclass(frozen=True)
-class PrintedEntry:
-    """The cells of a law in Table II, and what has to be changed.
+@dataclass(frozen=True, kw_only=True)
+class PrintedRow(Serializable):
+    """A row of Table II as the paper prints it, and what has to be changed.
 
     Attributes:
-        number: the cell as printed.
-        conservative: the cell as printed.
-        continuous: the cell as printed.
+        number: the characteristic number as printed.
+        value: its value for the parameters of section V.A; ``None`` if no formula is printed.
+        conservative: as printed.
+        continuous: as printed.
+        energy: energy gained around the law's loop by the printed formula, for the parameters of
+            section V.B [J]; ``None`` if only its sign is stated.
         formula: closed form of the number, with G₁ = 2πA/l and y = 4π²AD/l²; empty without one.
         change: with {y}, {radius} [mm] of the crests, {q} and {printed}, values for the parameters
             of section V.A.
     """
 
     number: str
+    value: float | None = None
     conservative: str
     continuous: str
-    formula: str
-    change: str
+    energy: float | None = None
+    formula: str = field(metadata=OMITTED)
+    change: str = field(metadata=OMITTED)
 
 
 TABLE_TWO = {
-    "A": PrintedEntry(
+    "A": PrintedRow(
         number="√(1 + [2πA/l]²)",
         conservative="No",
         continuous="If h continuous",
         formula="√(1 + G₁²)",
         change="Nothing, but that it is attained at x = 0 modulo l/2.",
     ),
-    "B": PrintedEntry(
+    "B": PrintedRow(
         number="No closed-form",
         conservative="No",
         continuous="If h' continuous",
         formula="max(√(1 + G₁²), y)",
         change="There is a closed form, and it grows with the depth: y = {y:.2f} here.",
     ),
-    "C": PrintedEntry(
+    "C": PrintedRow(
         number="No closed-form",
         conservative="Yes",
         continuous="If h' continuous",
@@ -61,7 +66,7 @@ TABLE_TWO = {
             "law q⁺ is the number that decides."
         ),
     ),
-    "D": PrintedEntry(
+    "D": PrintedRow(
         number="1",
         conservative="Yes",
         continuous="No. Even if h continuous",
@@ -71,14 +76,14 @@ TABLE_TWO = {
             "{radius:g} mm; from that depth on the force jumps and q is infinite. 1 is q⁺."
         ),
     ),
-    "E": PrintedEntry(
+    "E": PrintedRow(
         number="1",
         conservative="No",
         continuous="If h continuous",
         formula="1",
         change="Nothing; (19) and (20) have the wrong sign.",
     ),
-    "F": PrintedEntry(
+    "F": PrintedRow(
         number="Appendix I",
         conservative="Almost",
         continuous="If h continuous",
@@ -90,7 +95,7 @@ TABLE_TWO = {
             "{q:.4f}. 'Almost' is no: the loop of (27) gains energy."
         ),
     ),
-    "G": PrintedEntry(
+    "G": PrintedRow(
         number="No closed-form",
         conservative="No",
         continuous="If h' continuous",
@@ -98,27 +103,7 @@ TABLE_TWO = {
         change="There is a closed form, and it grows with the depth: y = {y:.2f} here.",
     ),
 }
-"""Entries by law."""
-
-
-@dataclass(frozen=True)
-class PrintedRow:
-    """A row of Table II as the paper prints it.
-
-    Attributes:
-        number: the characteristic number as printed.
-        value: its value for the parameters of section V.A; ``None`` if no formula is printed.
-        conservative: as printed.
-        continuous: as printed.
-        energy: energy gained around the law's loop by the printed formula, for the parameters of
-            section V.B [J]; ``None`` if only its sign is stated.
-    """
-
-    number: str
-    value: float | None
-    conservative: str
-    continuous: str
-    energy: float | None
+"""Rows by law, without the values of their formulas."""
 
 
 @dataclass(frozen=True)
@@ -260,11 +245,11 @@ def _row(letter: str) -> TableTwoRow:
         printed=printed,
         q=q,
         one_sided=one_sided_number(surface),
-        formula=TABLE_TWO[letter].formula,
+        formula=printed.formula,
         conservative=surface.facts.conservative,
         continuous=continuity(surface, q).continuous,
         energy=loop_work(looped, SCANNING.loop_path(letter)),
-        change=_explain_correction(letter, printed, q),
+        change=_explain_correction(printed, q),
     )
 
 
@@ -281,18 +266,16 @@ def _printed_rows() -> dict[str, PrintedRow]:
     values = {"A": math.hypot(1.0, slope), "D": 1.0, "E": 1.0, "F": PAPER_CASE.sticking_norm()}
     energies = {"A": half, "B": b_energy, "C": 0.0, "D": 0.0, "F": f_energy}
     return {
-        law: PrintedRow(
-            entry.number, values.get(law), entry.conservative, entry.continuous, energies.get(law)
-        )
-        for law, entry in TABLE_TWO.items()
+        law: replace(row, value=values.get(law), energy=energies.get(law))
+        for law, row in TABLE_TWO.items()
     }
 
 
-def _explain_correction(law: str, printed: PrintedRow, q: Bound) -> str:
+def _explain_correction(printed: PrintedRow, q: Bound) -> str:
     """Return the explanation of the differences."""
     case = PASSIVITY
     number = printed.value or 0.0
-    return TABLE_TWO[law].change.format(
+    return printed.change.format(
         y=4.0 * math.pi**2 * case.amplitude * case.depth / case.period**2,
         radius=1e3 * case.crest_radius,
         printed=number,
