@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import pickle
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
 from functools import partial
@@ -322,47 +320,54 @@ def info_command(file: str, outputs: Outputs) -> None:
     outputs.write(data, recording_page(recording, ranges))
 
 
-def _output_option(help_text: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that adds ``--output``, checked before the command runs."""
-
-    def decorate(function: Callable[..., None]) -> Callable[..., None]:
-        @functools.wraps(function)
-        def run(file: str, output: str, *, force: bool) -> None:
-            if os.path.exists(output) and os.path.exists(file) and os.path.samefile(output, file):
-                raise ParameterError("output", "must be another file than the recording", output)
-            check_output("output", output, force=force)
-            function(file, output)
-            click.echo(f"Saved: {escape_unprintable(output)}")
-
-        out = click.option("-o", "--output", metavar="PATH", required=True, help=help_text)
-        return out(force_option(run))
-
-    return decorate
+def _check_output(file: str, output: str, *, force: bool) -> None:
+    """Check before a computation that a file can be written, and is not the recording."""
+    if os.path.exists(output) and os.path.exists(file) and os.path.samefile(output, file):
+        raise ParameterError("output", "must be another file than the recording", output)
+    check_output("output", output, force=force)
 
 
 @recording_command.command("plot", short_help="Plot motion, force, energy and phase.")
 @click.argument("file")
 @plugin_option
-@_output_option("The file to write: a page (.html), or the figure alone (.svg, .png, .pdf).")
-def plot_command(file: str, output: str) -> None:
+@click.option(
+    "-o",
+    "--output",
+    metavar="PATH",
+    required=True,
+    help="The file to write: a page (.html), or the figure alone (.svg, .png, .pdf).",
+)
+@force_option
+def plot_command(file: str, output: str, *, force: bool) -> None:
     """Plot motion, force, energy and phase of the recording FILE."""
+    _check_output(file, output, force=force)
     from asperity.recording.recording import open_recording
     from asperity.report.pages.run_report import write_recording_report
 
     with progress_bar("plotting"):
         write_recording_report(open_recording(file), output)
+    click.echo(f"Saved: {escape_unprintable(output)}")
 
 
 @recording_command.command("export", short_help="Export a recording as CSV or MAT.")
 @click.argument("file")
-@_output_option("The file to write: .csv or .mat (MATLAB).")
-def export_rows_command(file: str, output: str) -> None:
+@click.option(
+    "-o",
+    "--output",
+    metavar="PATH",
+    required=True,
+    help="The file to write: .csv or .mat (MATLAB).",
+)
+@force_option
+def export_rows_command(file: str, output: str, *, force: bool) -> None:
     """Export the rows of the recording FILE with all digits as CSV or MAT."""
+    _check_output(file, output, force=force)
     from asperity.recording.recording import open_recording
     from asperity.recording.table_export import export_recording
 
     with progress_bar("exporting") as update:
         export_recording(open_recording(file), output, update)
+    click.echo(f"Saved: {escape_unprintable(output)}")
 
 
 @recording_command.command("replay", short_help="Replay a recording and compare the forces.")
