@@ -345,7 +345,7 @@ def _draw_onset_figure(experiment: PassivityExperiment) -> Figure:
 
 PAPER_FIGURES = (
     PaperFigure("fig-2", ["fig-2"], lambda _experiments: paper_pictures.figure_two(), False),
-    PaperFigure("fig-3", ["fig-3"], lambda _experiments: paper_pictures.figure_three(), False),
+    PaperFigure("fig-3", ["fig-3"], lambda _: paper_pictures.figure_three(loop_energies()), False),
     PaperFigure(
         "fig-5", ["fig-5"], _drawing(paper_pictures.cycles_figure, "passivity", _simulate_cycles)
     ),

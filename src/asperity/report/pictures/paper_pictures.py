@@ -14,7 +14,7 @@ from asperity.core.units import format_quantity
 from asperity.laws import find_law
 from asperity.paper.cycle_experiments import CycleCount, PassivityExperiment, bump_setup
 from asperity.paper.experiments import BumpExperiment, Experiments, ScanningExperiment
-from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
+from asperity.paper.figures import ForceField, LoopEnergy, force_fields
 from asperity.report.pictures import style
 from asperity.report.sentences.paper_text import loop_energy_text
 from asperity.report.sentences.texts import readable_name, table_notes
@@ -52,7 +52,7 @@ def figure_two() -> Figure:
         first = number % _COLUMNS == 0
         style.label_outer_axes(axes, "x [mm]", "z [mm]", lowest=lowest, first=first)
         axes.set_aspect("equal")
-    _draw_key(places[len(panels) :])
+    _draw_key(places[-1])
     for axes in places:
         # Arrows at the border are not clipped, and must not shrink the panels.
         for artist in axes.collections:
@@ -101,33 +101,28 @@ def _draw_forces(axes: Axes, panel: ForceField) -> None:
     axes.plot(handles[:, 0], handles[:, 1], "o", color=style.ORANGE, ms=4.0, zorder=5)
 
 
-def _draw_key(free_axes: Sequence[Axes]) -> None:
-    """Draw an arrow of known force in the first free axes; hide the others."""
-    for axes in free_axes:
-        axes.set_axis_off()
-    if not free_axes:
-        return
-    place: dict[str, Any] = {"transform": free_axes[0].transAxes}
+def _draw_key(axes: Axes) -> None:
+    """Draw an arrow of known force in free axes."""
+    axes.set_axis_off()
+    place: dict[str, Any] = {"transform": axes.transAxes}
     options: dict[str, Any] = {**place, "fontsize": style.LABEL, "color": style.MUTED}
     arrow = style.INCH_ARROWS | _HANDLE_ARROW | place
-    free_axes[0].quiver([0.02], [0.78], [_KEY_FORCE], [0.0], **arrow)
+    axes.quiver([0.02], [0.78], [_KEY_FORCE], [0.0], **arrow)
     handle = f"{_KEY_FORCE:g} N at a handle"
-    free_axes[0].text(0.4, 0.78, handle, va="center", **options)
+    axes.text(0.4, 0.78, handle, va="center", **options)
     for number, line in enumerate(table_notes("figure_two")):
-        free_axes[0].text(0.02, 0.58 - 0.12 * number, line, va="center", **options)
+        axes.text(0.02, 0.58 - 0.12 * number, line, va="center", **options)
 
 
-def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
+def figure_three(panels: Sequence[LoopEnergy]) -> Figure:
     """Return the closed path of each law, and the work of its force along the path.
 
     Args:
-        panels: see :func:`~asperity.paper.figures.loop_energies`; computed by default.
+        panels: see :func:`~asperity.paper.figures.loop_energies`.
 
     Reference:
         The paper's Fig. 3.
     """
-    if panels is None:
-        panels = loop_energies()
     rows = -(-len(panels) // 2)
     figure = style.new_figure(10.0, 2.15 * rows)
     grid: Any = figure.subplots(rows, _COLUMNS)

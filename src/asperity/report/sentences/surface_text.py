@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from asperity.analysis import characteristic_number
 from asperity.analysis.energy.leak import find_leak
@@ -27,9 +27,6 @@ from asperity.report.sentences.texts import (
 from asperity.surface import Surface
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.texture import Texture, TextureKind
-
-if TYPE_CHECKING:
-    pass
 
 # Lengths of maps and profiles, which are not arguments of a kind.
 _LENGTH_NAMES = {"pitch", "cutoff"}
