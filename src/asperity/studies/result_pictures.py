@@ -24,8 +24,7 @@ _STRONG = "C0"
 def scores_figure(result: StudyResult) -> Figure:
     """Return the scores: a grey mark for each participant, and the pooled ones with intervals."""
     labels = [label_text(result, label) or "all" for label in result.labels]
-    figure = style.new_figure(7.0, 1.2 + 0.45 * len(labels))
-    axes = style.single_axes(figure)
+    figure, axes = style.new_axes(7.0, 1.2 + 0.45 * len(labels))
     score = result.included_score
     places = np.arange(len(labels))
     values = score.to_scale(score.values)
@@ -57,8 +56,7 @@ def functions_figure(result: StudyResult) -> Figure:
     """
     levels = log_levels(result.design)
     name = str(result.design.options["level"])
-    figure = style.new_figure(7.0, 3.4)
-    axes = style.single_axes(figure)
+    figure, axes = style.new_axes(7.0, 3.4)
     answered = list(itertools.chain.from_iterable(result.included.values()))
     for column, label in enumerate(result.labels):
         trials = [trial for trial in answered if trial.presentation.condition == column]

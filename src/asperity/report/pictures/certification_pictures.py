@@ -17,8 +17,7 @@ _AXIS_COLOURS = (style.ORANGE, style.GREEN, style.BLUE)
 
 def loop_figure(loop: ClosedLoop) -> Figure:
     """Return the worst loop in the plane of its longest horizontal extent and the height."""
-    figure = style.new_figure(7.0, 4.0)
-    axes = style.single_axes(figure)
+    figure, axes = style.new_axes(7.0, 4.0)
     path = np.concatenate([loop.path, loop.path[:1]])
     axis = int(np.argmax(np.ptp(path[:, :2], axis=0)))
     unit = style.length_unit(float(np.ptp(path, axis=0).max()))

@@ -67,8 +67,7 @@ def device_wavelength_limits(device: Device) -> list[tuple[float, str]]:
 
 def spectrum_figure(texture: Texture, device: Device) -> Figure:
     """Return amplitude against wavelength, with the limits of the device."""
-    figure = style.new_figure(10.0, 3.4)
-    axes = style.single_axes(figure)
+    figure, axes = style.new_axes(10.0, 3.4)
     wavelength, amplitude = line_spectrum(texture)
     # Below are aliases of the nodes of a map, not heights.
     shown = amplitude > _LEAST_SHARE * max(float(amplitude.max()), 1e-300)
@@ -99,8 +98,7 @@ def hand_figure(comparison: Comparison) -> Figure:
     Drawn for the recommended law, or for the one that comes nearest to being felt. Hollow waves
     are not resolved by the device.
     """
-    figure = style.new_figure(10.0, 3.4)
-    axes = style.single_axes(figure)
+    figure, axes = style.new_axes(10.0, 3.4)
     row = comparison.recommended_row or comparison.nearest_row
     if row is None or row.perceptibility is None or not len(row.perceptibility.spectrum.motions):
         style.add_note(axes, "no texture at a known stiffness", (0.5, 0.5), ha="center")
@@ -130,8 +128,7 @@ def hand_figure(comparison: Comparison) -> Figure:
 
 def risk_figure(comparison: Comparison) -> Figure:
     """Return the share of random loops that cycle against the stiffness over K₀/q, by law."""
-    figure = style.new_figure(10.0, 3.4)
-    axes = style.single_axes(figure)
+    figure, axes = style.new_axes(10.0, 3.4)
     rows = [row for row in comparison.rows if row.margin.curve]
     for row, colour in zip(rows, _COLOURS * len(rows), strict=False):
         margin = row.margin

@@ -411,8 +411,7 @@ def merit_figure(comparison: Comparison) -> Figure:
 
     Laws with unbounded loop gain are at the origin.
     """
-    figure = style.new_figure(10.0, 4.6)
-    axes = style.single_axes(figure)
+    figure, axes = style.new_axes(10.0, 4.6)
     scale = 1.0
     label = "strength T"
     if strength_has_unit(comparison):

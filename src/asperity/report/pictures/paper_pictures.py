@@ -38,22 +38,17 @@ def figure_two() -> Figure:
     """
     panels = force_fields()
     figure = style.new_figure(10.0, 6.6)
-    grid: Any = figure.subplots(2, _COLUMNS, sharex=True, sharey=True)
-    places = list(grid.ravel())
-    for number, (axes, panel) in enumerate(zip(places, panels, strict=False)):
-        style.style_axes(axes)
+    places = style.axes_grid(figure, len(panels), _COLUMNS, x="x [mm]", y="z [mm]")
+    for axes, panel in zip(places, panels, strict=True):
         _draw_body(axes, panel)
         _draw_forces(axes, panel)
         style.mark_law(axes, panel.law)
         start = "flat wall" if _is_measured_from_wall(panel.law) else "texture"
         remark = f"depth below the {start}"
         style.set_panel_title(axes, panel.law, readable_name(panel.name), remark)
-        lowest = number + _COLUMNS >= len(panels)
-        first = number % _COLUMNS == 0
-        style.label_outer_axes(axes, "x [mm]", "z [mm]", lowest=lowest, first=first)
         axes.set_aspect("equal")
-    _draw_key(places[-1])
-    for axes in places:
+    _draw_key(figure.axes[-1])
+    for axes in figure.axes:
         # Arrows at the border are not clipped, and must not shrink the panels.
         for artist in axes.collections:
             artist.set_in_layout(False)
@@ -103,6 +98,7 @@ def _draw_forces(axes: Axes, panel: ForceField) -> None:
 
 def _draw_key(axes: Axes) -> None:
     """Draw an arrow of known force in free axes."""
+    axes.set_visible(True)
     axes.set_axis_off()
     place: dict[str, Any] = {"transform": axes.transAxes}
     options: dict[str, Any] = {**place, "fontsize": style.LABEL, "color": style.MUTED}

@@ -155,6 +155,12 @@ def single_axes(figure: Figure | SubFigure) -> Axes:
     return axes
 
 
+def new_axes(width: float, height: float) -> tuple[Figure, Axes]:
+    """Return a new figure of a size [inch] with its only axes."""
+    figure = new_figure(width, height)
+    return figure, single_axes(figure)
+
+
 def law_panels(
     count: int, height: float, margin: float, *, x: str, y: str, sharey: bool = True
 ) -> tuple[Figure, list[Axes]]:
