@@ -148,7 +148,6 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     style.style_axes(axes)
     style.label_axes(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     _draw_scan_line(axes, texture, wide)
-    _draw_scale_bar(axes, float(grid.size[0]))
     style.add_colorbar(figure, known, axes, f"height [{high.name}]")
 
 
@@ -197,20 +196,6 @@ def _draw_scan_line(axes: Axes, texture: Texture, unit: style.AxisUnit) -> None:
     style.add_note(axes, "scan line", start, xycoords="data", xytext=(6, 5), color=style.INK)
 
 
-def _draw_scale_bar(axes: Axes, width: float) -> None:
-    """Draw a bar of a round length in the lower right corner of a map of that width [m]."""
-    unit = style.length_unit(width)
-    length = style.nice_length(0.22 * width)
-    right = 0.97
-    span = length / width
-    for colour, thickness in (("white", 6.0), (style.INK, 3.0)):
-        options: dict[str, Any] = {"color": colour, "lw": thickness, "solid_capstyle": "butt"}
-        axes.plot([right - span, right], [0.06, 0.06], transform=axes.transAxes, **options)
-    text = f"{length * unit.scale:g} {unit.name}"
-    middle = right - 0.5 * span
-    style.add_note(axes, text, (middle, 0.085), ha="center", va="bottom", color=style.INK)
-
-
 # --- thin parts of a body -------------------------------------------------------------------------
 
 
@@ -218,8 +203,8 @@ def thin_parts_figure(texture: Texture, half: FloatArray) -> Figure:
     """Return a map of half of the thickness of a baked body where it is thin, from above."""
     wide, frame = map_grid(texture, max(half.shape)).frame
     deep = style.length_unit(float(np.nanmax(half)))
-    figure = style.new_figure(8.0, min(max(6.4 * half.shape[0] / half.shape[1], 1.6), 6.4) + 0.8)
-    axes = figure.subplots()
+    height = min(max(6.4 * half.shape[0] / half.shape[1], 1.6), 6.4) + 0.8
+    figure, axes = style.new_axes(8.0, height)
     options: dict[str, Any] = {"origin": "lower", "extent": frame, "interpolation": "nearest"}
     body = np.full((*half.shape, 4), matplotlib.colors.to_rgba(style.BODY))
     if texture.filled_mask is not None:
@@ -228,7 +213,6 @@ def thin_parts_figure(texture: Texture, half: FloatArray) -> Figure:
     image = axes.imshow(half * deep.scale, style.HEIGHTS, vmin=0.0, **options)
     x, y, _z = texture.thin_regions[0].at
     axes.plot(x * wide.scale, y * wide.scale, "x", color=style.ORANGE, markersize=9.0, mew=2.0)
-    style.style_axes(axes)
     style.label_axes(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     style.add_colorbar(figure, image, axes, f"depth [{deep.name}]")
     return figure
@@ -287,12 +271,10 @@ def heights_figure(heights_by_title: Mapping[str, FloatArray], sides: tuple[floa
     count = len(heights_by_title)
     if len(sides) == 1:
         figure = style.new_figure(10.0, 1.6 * count)
-        panels: Any = figure.subplots(count, 1, sharex=True, squeeze=False)
-        for axes, (title, heights) in zip(panels.ravel(), heights_by_title.items(), strict=True):
+        x = f"along the profile [{style.length_unit(sides[0]).name}]"
+        panels = style.axes_grid(figure, count, 1, x=x, sharey=False)
+        for axes, (title, heights) in zip(panels, heights_by_title.items(), strict=True):
             _draw_profile(axes, heights, sides[0], title)
-        unit = style.length_unit(sides[0])
-        label = f"along the profile [{unit.name}]"
-        panels[-1, 0].set_xlabel(label, fontsize=style.LABEL, color=style.MUTED)
         return figure
     rows = 1
     columns = count
@@ -302,8 +284,8 @@ def heights_figure(heights_by_title: Mapping[str, FloatArray], sides: tuple[floa
     width = 10.0 / columns - 0.9
     height = min(width * sides[1] / sides[0], _MAX_MAP_HEIGHT) + 0.75
     figure = style.new_figure(10.0, rows * height)
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes, (title, heights) in zip(panels.ravel(), heights_by_title.items(), strict=True):
+    panels = style.axes_grid(figure, count, columns)
+    for axes, (title, heights) in zip(panels, heights_by_title.items(), strict=True):
         _draw_height_map(figure, axes, heights, (sides[0], sides[1]), title)
     return figure
 
@@ -315,8 +297,7 @@ def _draw_profile(axes: Axes, heights: FloatArray, length: float, title: str) ->
     along = np.linspace(0.0, length * wide.scale, len(heights))
     axes.plot(along, heights * high.scale, color=style.INK, linewidth=0.8, label="height")
     axes.set_xlim(along[0], along[-1])
-    style.style_axes(axes)
-    style.label_axes(axes, "", f"height [{high.name}]")
+    axes.set_ylabel(f"height [{high.name}]", fontsize=style.LABEL, color=style.MUTED)
     _add_title(axes, title)
 
 
@@ -333,7 +314,6 @@ def _draw_height_map(
     colours: dict[str, Any] = {"cmap": style.HEIGHTS, "vmin": span[0], "vmax": span[1]}
     options: dict[str, Any] = {"origin": "lower", "extent": frame, "interpolation": "nearest"}
     image = axes.imshow(heights * high.scale, **colours, **options)
-    style.style_axes(axes)
     _add_title(axes, title)
     style.label_axes(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     style.add_colorbar(figure, image, axes, f"height [{high.name}]", extend="both")
