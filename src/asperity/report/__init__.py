@@ -128,10 +128,14 @@ def html_text(result: Any) -> str:
     Raises:
         TypeError: for a result without a report.
     """
+    return render_page(_find_report(result), text_digest(json_text(result)))
+
+
+def _find_report(result: Any) -> Page:
     page = find_page(result)
     if page is None or not page.title:
         raise TypeError(f"a {type(result).__name__} has no report")
-    return render_page(page, text_digest(json_text(result)))
+    return page
 
 
 def latex_text(result: Any) -> str:
@@ -142,10 +146,7 @@ def latex_text(result: Any) -> str:
     Raises:
         TypeError: for a result without a report.
     """
-    page = find_page(result)
-    if page is None or not page.title:
-        raise TypeError(f"a {type(result).__name__} has no report")
-    return render_latex(page)
+    return render_latex(_find_report(result))
 
 
 def notebook_html(result: Any) -> str | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,16 +110,6 @@ _CANDIDATES = 51
 _SLOPES = (-2.0, 3.0, 15)  # logarithm of the slope at the threshold: ends, number
 
 
-class Track(Protocol):
-    """A procedure that chooses levels x, the natural logarithm of an increment."""
-
-    def level(self) -> float:
-        """Return the level to present now."""
-
-    def record(self, correct: bool) -> None:
-        """Record whether the answer was right."""
-
-
 class Staircase:
     """The weighted up-down staircase, which settles where a share p of the answers is right.
 
@@ -210,7 +200,7 @@ class BayesianTrack:
         self.procedure.Observe(int(correct))
 
 
-TRACKS: dict[str, Callable[[LogLevels, Mapping[str, Any]], Track]] = {
+TRACKS: dict[str, Callable[[LogLevels, Mapping[str, Any]], Staircase | BayesianTrack]] = {
     "weighted-up-down": lambda levels, options: Staircase(
         levels, math.log(options["step"]), float(options["target"])
     ),
