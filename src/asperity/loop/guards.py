@@ -55,8 +55,6 @@ KERNELS = Kernels(
         "finish_timing",
         "guard_force",
         "read_position",
-        "release_device",
-        "release_force",
         "requested_end",
         "write_force",
     ),
@@ -290,17 +288,6 @@ def check_sample(servo: ServoState, force: GuardedForce, guards: Guards, texture
         status[DEEPEST] = max(status[DEEPEST], int(1e12 * depth))
         cause = DEPTH if limits.depth_is_fault else RUNNING
     return cause if is_finite_vector(force.fx, force.fy, force.fz) else NOT_FINITE
-
-
-def release_force(force: GuardedForce) -> GuardedForce:
-    """Return the state without force."""
-    return GuardedForce(0.0, 0.0, 0.0, 0.0, force.energy, 0.0)
-
-
-def release_device(force: GuardedForce, guards: Guards, device: object) -> GuardedForce:
-    """Command no force; return the state without force."""
-    write_force(0.0, 0.0, 0.0, False, guards, device)
-    return release_force(force)
 
 
 def finish_timing(

@@ -24,8 +24,6 @@ KERNELS = Kernels(
         "finish_timing",
         "guard_force",
         "read_position",
-        "release_device",
-        "release_force",
         "requested_end",
         "write_force",
     )
@@ -73,21 +71,11 @@ def check_sample(servo: ServoState, force: GuardedForce, guards: object, texture
     return RUNNING
 
 
-def release_force(force: GuardedForce) -> GuardedForce:
-    """Return no force."""
-    return GuardedForce(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 def write_force(
     fx: float, fy: float, fz: float, in_contact: bool, guards: object, device: object
 ) -> int:
     """Command a force [N]."""
     return device_write(fx, fy, fz, in_contact, device)
-
-
-def release_device(force: GuardedForce, guards: object, device: object) -> GuardedForce:
-    """Leave the device as it is."""
-    return force
 
 
 def finish_timing(

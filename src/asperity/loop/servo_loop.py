@@ -15,8 +15,6 @@ from asperity.loop.guards import (
     finish_timing,
     guard_force,
     read_position,
-    release_device,
-    release_force,
     requested_end,
     write_force,
 )
@@ -24,6 +22,7 @@ from asperity.loop.interface import (
     DEVICE,
     OK,
     RUNNING,
+    GuardedForce,
     LoopState,
     LoopTiming,
     trace_sample,
@@ -73,8 +72,8 @@ def servo_loop(
             state, end_sample, settings, clock, guards, device, trace, memory, texture, law
         )
     # Release the force once more, even after a failed write.
-    force = release_device(state.force, guards, device)
-    return cause, code, LoopState(state.servo, force, state.timing)
+    write_force(0.0, 0.0, 0.0, False, guards, device)
+    return cause, code, LoopState(state.servo, release_force(state.force), state.timing)
 
 
 def start_timing(timing: LoopTiming, clock: Clock) -> LoopTiming:
@@ -83,6 +82,11 @@ def start_timing(timing: LoopTiming, clock: Clock) -> LoopTiming:
         return timing
     now = clock_now(0, clock)
     return LoopTiming(timing.sample, now, 0, timing.heartbeat, now)
+
+
+def release_force(force: GuardedForce) -> GuardedForce:
+    """Return the state without force."""
+    return GuardedForce(0.0, 0.0, 0.0, 0.0, force.energy, 0.0)
 
 
 def run_sample(
