@@ -24,7 +24,7 @@ from asperity.analysis.bounds.branch_and_bound import (
     supremum,
 )
 from asperity.analysis.bounds.sampling import highest_point, sample_supremum
-from asperity.analysis.gain.proofs import CrestProblem, q_d
+from asperity.analysis.gain.proofs import CrestProblem, norm_from_curvature, q_d
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import Cells
 from asperity.surface import Surface
@@ -192,7 +192,7 @@ def crest_number(surface: Surface, options: SearchOptions) -> bound.Bound:
         least = max(least, 1.0 / texture.bounds[1])
     witness = bound.witness_in_contact(surface, bound.NORM, xy, depth)
     # The effect of rounding grows towards the medial axis.
-    upper = _norm_from_curvature(_curvature_times_depth(least, depth)) * (1.0 + _RELATIVE_ROUNDING)
+    upper = norm_from_curvature(_curvature_times_depth(least, depth)) * (1.0 + _RELATIVE_ROUNDING)
     top = bound.checked_upper_bound(surface, bound.NORM, upper, witness)
     if math.isinf(upper):
         return bound.Bound(witness.value, top, "sampled", witness.at, _UNDECIDED_NOTE)
@@ -223,7 +223,7 @@ def gain_above_crest(surface: Surface, height: float) -> float:
     reach = crest.point[2] - crest.centre[2]
     if reach <= 0.0:  # a radius below the precision of the height
         return math.inf if above > 0.0 else 1.0
-    return _norm_from_curvature(above / reach)
+    return norm_from_curvature(above / reach)
 
 
 def split_number(surface: Surface, options: SearchOptions) -> bound.Bound:
@@ -242,7 +242,7 @@ def split_number(surface: Surface, options: SearchOptions) -> bound.Bound:
     xy = np.array(crest.point[:2])
     # At the onset of the split the force has two one-sided derivatives.
     depths = [min(surface.max_depth, (1.0 - 1e-6) * share), min(surface.max_depth, 1.05 * share)]
-    alone = _norm_from_curvature(_curvature_times_depth(crest.min_radius, surface.max_depth))
+    alone = norm_from_curvature(_curvature_times_depth(crest.min_radius, surface.max_depth))
     upper = min(c, alone * (1.0 + _RELATIVE_ROUNDING) if alone > 1.0 else 1.0)
     if upper < c:
         reason = "law D's number: the depth is too small for the god-object to split"
@@ -254,9 +254,3 @@ def _curvature_times_depth(radius: float, depth: float) -> float:
     if radius <= 0.0:
         return math.inf
     return depth / radius * (1.0 + _RELATIVE_ROUNDING)
-
-
-def _norm_from_curvature(y: float) -> float:
-    if y >= 1.0:
-        return math.inf
-    return max(1.0, y / (1.0 - y))

@@ -95,7 +95,11 @@ def _feasible_root(wave: SingleWave, depth: float) -> float:
 
 def q_d(wave: SingleWave, depth: float) -> float:
     """q_D = 1 if y <= 1/2, y/(1 - y) if y < 1, infinite from y = 1 on."""
-    y = _max_curvature_depth(wave, depth)
+    return norm_from_curvature(_max_curvature_depth(wave, depth))
+
+
+def norm_from_curvature(y: float) -> float:
+    """Return ‖J‖/k of law D at a product y of depth and curvature, and at least 1."""
     if y >= 1.0:
         return math.inf
     return max(1.0, y / (1.0 - y))
