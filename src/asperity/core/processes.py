@@ -166,7 +166,7 @@ def precompute(work: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Ite
 
     Args:
         work: function of a module, called in the workers; its result must be picklable.
-        tasks: its arguments.
+        tasks: its arguments; ``None`` for a task that no worker can do.
 
     Yields:
         An iterator over the tasks in order: the result of a worker, or ``None`` for a task that
@@ -199,7 +199,7 @@ def _share_fractions(fractions: Any) -> None:
 def _run_task(work: Callable[[Any], Any], index: int, task: Any) -> Any:
     """Do a task in a worker, and write its progress."""
     PROGRESS_CALLBACKS[:] = [partial(_FRACTIONS[0].__setitem__, index)]
-    return work(task)
+    return None if task is None else work(task)
 
 
 class _TaskQueue:

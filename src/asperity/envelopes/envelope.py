@@ -337,10 +337,8 @@ def _wavelength_limits(case: WaveCase) -> tuple[WavelengthLimit, ...]:
 Task = tuple[WaveCase, tuple[float, ...]]
 
 
-def compute_task(task: Task | None) -> tuple[WaveBorders, ...] | None:
+def compute_task(task: Task) -> tuple[WaveBorders, ...]:
     """Compute the borders of a task, in a worker process."""
-    if task is None:
-        return None
     return find_borders(*task)
 
 

@@ -206,10 +206,8 @@ def _make_target(
 Found = tuple[Search, Answer]
 
 
-def search_law(search: Search | None) -> Found | None:
+def search_law(search: Search) -> Found:
     """Return a search and its answer, also in a worker process."""
-    if search is None:
-        return None
     if search.texture.single_wave is None:
         return search, search.find_answer()
     # Many waves are tried, and each takes less time than the cache.
@@ -227,9 +225,7 @@ def _best_law(searches: Sequence[Search], report: Progress) -> Found:
         with precompute(search_law, shared) as precomputed:
             for search, computed in zip(group, precomputed, strict=True):
                 report(f"law {search.case.letter}")
-                result = computed or search_law(search)
-                if result is not None:
-                    results.append(result)
+                results.append(computed or search_law(search))
         if any(answer.is_met for _search, answer in results):
             break
     return max(results, key=_preference)

@@ -46,13 +46,11 @@ class ComparisonQuery:
 
 
 Task = tuple[Surface, ComparisonQuery]
-"""A surface and the conditions under which it is analysed."""
 
 
-def precompute_row(task: Task | None) -> None:
+def precompute_row(task: Task) -> None:
     """Compute a row in a worker process, which leaves its numbers in the cache."""
-    if task is not None:
-        render_row(*task)
+    render_row(*task)
 
 
 def render_row(surface: Surface, query: ComparisonQuery) -> LawRow:
