@@ -95,6 +95,14 @@ def check_positive(name: str, value: object, unit: str = "") -> float:
     return number
 
 
+def check_nonnegative(name: str, value: object, unit: str = "") -> float:
+    """Return a number that is not negative; see :func:`check_real`."""
+    number = check_real(name, value, unit)
+    if number < 0.0:
+        raise ParameterError(name, f"must not be negative{_unit_text(unit)}", value)
+    return number
+
+
 def check_fraction(name: str, value: object) -> float:
     """Return a number in [0, 1]; see :func:`check_real`."""
     number = check_real(name, value)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.checks import FloatArray, check_array, check_positive, check_real
+from asperity.core.checks import FloatArray, check_array, check_nonnegative, check_positive
 from asperity.core.errors import ParameterError
 
 
@@ -37,8 +37,7 @@ class FiveBar:
     def __post_init__(self) -> None:
         check_positive("proximal", self.proximal, "m")
         check_positive("distal", self.distal, "m")
-        if check_real("base", self.base, "m") < 0.0:
-            raise ParameterError("base", "must not be negative [m]", self.base)
+        check_nonnegative("base", self.base, "m")
 
 
 def joint_angles(linkage: FiveBar, point: ArrayLike) -> FloatArray:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.checks import FloatArray, check_positive, check_real
+from asperity.core.checks import FloatArray, check_nonnegative, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
 from asperity.simulation.hands import SpringHand
@@ -42,8 +42,7 @@ class Resonance(Serializable):
 
     def __post_init__(self) -> None:
         check_positive("frequency", self.frequency, "Hz")
-        if check_real("damping_ratio", self.damping_ratio) < 0.0:
-            raise ParameterError("damping_ratio", "must not be negative", self.damping_ratio)
+        check_nonnegative("damping_ratio", self.damping_ratio)
         if not 0.0 < check_real("mass_fraction", self.mass_fraction) < 1.0:
             raise ParameterError("mass_fraction", "must be between 0 and 1", self.mass_fraction)
 

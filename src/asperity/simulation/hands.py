@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.checks import FloatArray, check_array, check_positive, check_real
+from asperity.core.checks import FloatArray, check_array, check_nonnegative, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.loop.bodies.body_parts import HandRecord
+from asperity.loop.bodies.body_parts import HandRecord, Triple
 
 # ruff: noqa: ARG002 - one signature for all hands
 
@@ -186,9 +186,6 @@ class Waypoints(NamedPart):
         return np.stack(columns, axis=-1)
 
 
-Triple = tuple[float, float, float]
-
-
 def per_axis(name: str, value: ArrayLike, unit: str, *, signed: bool = False) -> Triple:
     """Return one number per axis, from one number or three.
 
@@ -202,18 +199,6 @@ def per_axis(name: str, value: ArrayLike, unit: str, *, signed: bool = False) ->
     if not signed and min(x, y, z) < 0.0:
         raise ParameterError(name, f"must not be negative [{unit}]", value)
     return float(x), float(y), float(z)
-
-
-def nonnegative(name: str, value: object, unit: str) -> float:
-    """Return a finite nonnegative number.
-
-    Raises:
-        ParameterError: for any other value.
-    """
-    number = check_real(name, value, unit)
-    if number < 0.0:
-        raise ParameterError(name, f"must not be negative [{unit}]", value)
-    return number
 
 
 class Hand(NamedPart, ABC):
@@ -316,7 +301,7 @@ class SpringHand(Hand):
     ) -> None:
         object.__setattr__(self, "stiffness", per_axis("stiffness", stiffness, "N/m"))
         object.__setattr__(self, "damping", per_axis("damping", damping, "N s/m"))
-        object.__setattr__(self, "mass", nonnegative("mass", mass, "kg"))
+        object.__setattr__(self, "mass", check_nonnegative("mass", mass, "kg"))
         object.__setattr__(self, "force", per_axis("force", force, "N", signed=True))
 
     @property
@@ -386,8 +371,8 @@ class BandHand(Hand):
     def __post_init__(self) -> None:
         check_positive("stiffness", self.stiffness, "N/m")
         check_positive("length", self.length, "m")
-        nonnegative("tension", self.tension, "N")
-        nonnegative("damping", self.damping, "N s/m")
+        check_nonnegative("tension", self.tension, "N")
+        check_nonnegative("damping", self.damping, "N s/m")
         if self.rest_length <= 0.0:
             raise ParameterError(
                 "tension",

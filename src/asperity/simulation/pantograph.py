@@ -10,13 +10,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.checks import FloatArray, check_array
+from asperity.core.checks import FloatArray, check_array, check_nonnegative
 from asperity.core.errors import ParameterError
 from asperity.devices.five_bar import FiveBar, handle_damping, joint_angles
 from asperity.loop.bodies import body_parts
 from asperity.loop.bodies import pantograph_dynamics as pantograph
 from asperity.loop.bodies.pantograph_dynamics import LinkageRecord, PantographRecord
-from asperity.simulation.hands import Hand, nonnegative
+from asperity.simulation.hands import Hand
 from asperity.simulation.plants import (
     Plant,
     SampledPlant,
@@ -52,8 +52,8 @@ class LinkMasses:
 
     def __post_init__(self) -> None:
         for name in ("proximal", "distal", "handle"):
-            nonnegative(name, getattr(self, name), "kg")
-        nonnegative("rotor", self.rotor, "kg m²")
+            check_nonnegative(name, getattr(self, name), "kg")
+        check_nonnegative("rotor", self.rotor, "kg m²")
         if self.distal + self.handle == 0.0:
             raise ParameterError("handle", "must have a mass if the distal links have none")
 
@@ -111,8 +111,8 @@ class Pantograph(Plant):
             raise ParameterError("linkage", "must be a FiveBar", self.linkage)
         if not isinstance(self.masses, LinkMasses):
             raise ParameterError("masses", "must be LinkMasses", self.masses)
-        nonnegative("joint_damping", self.joint_damping, "N m s")
-        nonnegative("friction", self.friction, "N")
+        check_nonnegative("joint_damping", self.joint_damping, "N m s")
+        check_nonnegative("friction", self.friction, "N")
         x, z = check_array("centre", self.centre, (2,), "m")
         object.__setattr__(self, "centre", (float(x), float(z)))
         joint_angles(self.linkage, self.centre)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.checks import FloatArray, check_array
+from asperity.core.checks import FloatArray, check_array, check_nonnegative
 from asperity.core.errors import ParameterError
 from asperity.loop.bodies import (
     axis_body,
@@ -23,7 +23,7 @@ from asperity.loop.bodies import (
     prescribed_motion,
 )
 from asperity.simulation.discretization import Resonance, integrate, linear_body
-from asperity.simulation.hands import Hand, NamedPart, SpringHand, Triple, nonnegative, per_axis
+from asperity.simulation.hands import Hand, NamedPart, SpringHand, per_axis
 from asperity.simulation.servo import Servo
 
 # Parts of a sample over which dry friction is held constant.
@@ -233,7 +233,7 @@ class Cartesian(Plant):
 
     kind: ClassVar[str] = "cartesian"
 
-    mass: Triple
+    mass: body_parts.Triple
     damping: FloatArray
     resonance: Resonance | None
     friction: float
@@ -253,7 +253,7 @@ class Cartesian(Plant):
         object.__setattr__(self, "mass", axes)
         object.__setattr__(self, "damping", symmetric_matrix("damping", damping, "N s/m"))
         object.__setattr__(self, "resonance", resonance)
-        object.__setattr__(self, "friction", nonnegative("friction", friction, "N"))
+        object.__setattr__(self, "friction", check_nonnegative("friction", friction, "N"))
 
     def sample(self, hand: Hand, period: float) -> SampledPlant:
         """Return the mass held by a hand, over one sample."""

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.core.checks import check_positive, check_real
+from asperity.core.checks import check_nonnegative, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
 from asperity.kernels.tick import ServoSettings
-from asperity.simulation.hands import nonnegative
 
 
 @dataclass(frozen=True)
@@ -46,8 +45,8 @@ class Servo(Serializable):
     def __post_init__(self) -> None:
         check_positive("period", self.period, "s")
         object.__setattr__(self, "delay", _check_delay(self.delay))
-        nonnegative("position_resolution", self.position_resolution, "m")
-        nonnegative("force_resolution", self.force_resolution, "N")
+        check_nonnegative("position_resolution", self.position_resolution, "m")
+        check_nonnegative("force_resolution", self.force_resolution, "N")
         if isinstance(self.max_force, bool) or not _to_float(self.max_force) > 0.0:
             raise ParameterError("max_force", "must be positive [N]", self.max_force)
         check_real("virtual_damping", self.virtual_damping, "N s/m")
