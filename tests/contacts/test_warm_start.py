@@ -272,7 +272,9 @@ def test_simulation_counts_truncated_searches():
     anchor = np.linspace([0.5e-3, 0.5e-3, -1e-3], [1.5e-3, 1.2e-3, -1e-3], 201)
     results = []
     for budget in (30.0, 30.0, None):
-        simulation = Simulation(surface, body, servo, anchor[0], max_evaluations=budget)
+        simulation = Simulation(surface, body, servo, anchor[0], np.zeros(3))
+        simulation.max_evaluations = budget or simulation.max_evaluations
+        simulation.reset()
         simulation.run(anchor)
         results.append((*simulation.search_truncation, *simulation.state))
     assert results[0] == results[1]

@@ -336,7 +336,6 @@ class BatchSimulation:
         self._body = sampled_plant(plant, hand, servo)
         self._loop = LaneLoop(surface, self._body, servo)
         self._anchor = np.empty((0, 3))
-        self._anchor_count = 0
 
     def new_trajectory(
         self, stiffness: float, delay: int, offset: FloatArray, stop_rule: StopRule
@@ -374,12 +373,10 @@ class BatchSimulation:
     def _anchor_up_to(self, last: int) -> FloatArray:
         """Return positions of the hand's anchor at the samples up to one at least [m]."""
         plant, _hand, servo, motion = self._parts
-        count = self._anchor_count
-        if last >= len(self._anchor):
-            self._anchor = np.concatenate([self._anchor[:count], np.empty((2 * last, 3))])
+        count = len(self._anchor)
         if last >= count:
-            self._anchor[count : last + 1] = anchor_points(motion, servo.period, plant, count, last)
-            self._anchor_count = last + 1
+            more = anchor_points(motion, servo.period, plant, count, last)
+            self._anchor = np.concatenate([self._anchor, more])
         return self._anchor
 
 

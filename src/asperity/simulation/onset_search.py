@@ -33,17 +33,16 @@ _DECAY_RATIO = 0.9
 _MIN_SAMPLES = 8
 
 
-def felt_speed(speed: float, extent: float, grip: Grip | None = None) -> float:
+def felt_speed(speed: float, extent: float) -> float:
     """Return the RMS speed [m/s] above which a hand feels an oscillation, at its frequency.
 
-    An oscillation of RMS speed v and RMS displacement x has the frequency f = v/(2π x). A hand
-    feels amplitudes above a(f), which is the RMS speed √2 π f a(f). Beyond the frequencies of the
-    thresholds the speed at the nearest of them counts.
+    An oscillation of RMS speed v and RMS displacement x has the frequency f = v/(2π x). A hand that
+    holds a tool like a pen feels amplitudes above a(f), which is the RMS speed √2 π f a(f). Beyond
+    the frequencies of the thresholds the speed at the nearest of them counts.
 
     Args:
         speed: RMS speed of the oscillation [m/s].
         extent: RMS displacement [m].
-        grip: grip with its thresholds; default: a tool held like a pen.
 
     Example:
         >>> round(felt_speed(0.1, 0.1 / (2 * math.pi * 100)) * 1e3, 3)  # 100 Hz, in mm/s
@@ -51,8 +50,7 @@ def felt_speed(speed: float, extent: float, grip: Grip | None = None) -> float:
         >>> round(felt_speed(0.1, 0.1 / (2 * math.pi * 24)) * 1e3, 3)  # 24 Hz: that at 40 Hz
         0.444
     """
-    if grip is None:
-        grip = _default_grip()
+    grip = _default_grip()
     frequency = grip.frequency[-1]
     if extent > 0.0:
         frequency = speed / (2.0 * math.pi * extent)

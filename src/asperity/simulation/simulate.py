@@ -54,9 +54,7 @@ class Simulation(Lane):
         plant: the device and the hand that holds it.
         servo: the servo.
         start: position [m], shape (3,).
-        velocity: [m/s], shape (3,); default: at rest.
-        max_evaluations: evaluation budget of a tick in its search for closest points; default: that
-            of the law's contact. A larger budget takes longer, and truncates fewer searches.
+        velocity: [m/s], shape (3,).
 
     Raises:
         ParameterError: for a delay of more than ``MAX_DELAY`` samples.
@@ -68,14 +66,10 @@ class Simulation(Lane):
         plant: SampledPlant,
         servo: Servo,
         start: FloatArray,
-        velocity: FloatArray | None = None,
-        max_evaluations: float | None = None,
+        velocity: FloatArray,
     ) -> None:
-        if velocity is None:
-            velocity = np.zeros(3)
         state = plant.initial_state(start, velocity)
-        if max_evaluations is None:
-            max_evaluations = surface.law.contact.max_evaluations
+        max_evaluations = surface.law.contact.max_evaluations
         super().__init__(state, servo.delay, surface.stiffness, max_evaluations)
         self._loop = LaneLoop(surface, plant, servo)
         self._energy_at_start = 0.0
@@ -91,17 +85,10 @@ class Simulation(Lane):
 
         Returns:
             Why the run stopped before the end.
-
-        Raises:
-            ParameterError: for a trace whose rows have another length.
         """
         first = self.samples
         if first == 0:
             self._energy_at_start = self._loop.stored_energy(self.state, anchor[0])
-        if trace.ndim != 2 or trace.shape[1] != len(COLUMNS):
-            raise ParameterError(
-                "trace", f"must have rows of {len(COLUMNS)} numbers, got shape {trace.shape}"
-            )
         self.counters[FIRST_SAMPLE] = first
         self.rows_written = self._loop.run([self], len(anchor) - 1, anchor, trace, every)
         self._anchor = anchor[self.samples - first].copy()

@@ -52,7 +52,6 @@ COLUMNS = (
     ("law held", "1"),
     ("law anchor z", "m"),
 )
-"""Columns of the trace with their units."""
 
 
 class DecimatedTrace:
