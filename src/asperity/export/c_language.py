@@ -181,7 +181,6 @@ REAL_FUNCTIONS |= {f"arc{name}": f"a{name}" for name in ("cos", "sin", "tan", "t
 """C functions of the functions of ``math`` and ``numpy`` from real numbers to a real number."""
 
 REAL_CONSTANTS = {name: float(getattr(math, name)) for name in ("e", "inf", "nan", "pi", "tau")}
-"""Constants of ``math`` and ``numpy``."""
 
 BIT_OPERATORS: dict[type[ast.operator], str] = {
     ast.LShift: "<<",

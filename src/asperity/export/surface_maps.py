@@ -187,7 +187,6 @@ CONVENTIONS = {
     # As cAlgorithmFingerProxy reads it; a PNG's last row is the first of its cImage.
     "chai3d": NormalConvention("CHAI3D, cNormalMap", 128.0, 127.0),
 }
-"""Conventions of normal maps, by name."""
 
 
 def height_png(surface_map: SampledMap) -> bytes:
@@ -272,7 +271,6 @@ HEIGHT_MAPS: dict[str, Callable[[SampledMap], bytes]] = {
     ".tiff": height_tiff,
     ".x3p": height_x3p,
 }
-"""Encoders of height maps, by suffix of the file."""
 
 
 def height_resolution(surface_map: SampledMap, suffix: str) -> float:

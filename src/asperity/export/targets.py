@@ -162,7 +162,6 @@ TARGETS = {
         COMPILER,
     ),
 }
-"""Export targets by name."""
 
 
 def find_target(name: str) -> ExportTarget:

@@ -23,7 +23,6 @@ from asperity.textures.kinds.prepare_synthetic import prepare_texture
 from asperity.textures.texture import Texture
 
 DEFAULT_SURFACE = "sinusoid:amplitude=0.2mm,period=2mm"
-"""The default surface."""
 START_LAW = "C"
 START_STIFFNESS = 250.0
 """Initial stiffness without a scene [N/m]."""

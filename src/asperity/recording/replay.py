@@ -48,7 +48,6 @@ COMPARED_COLUMNS = (
     "law held",
     "law anchor z",
 )
-"""The columns that are computed and compared."""
 
 
 @dataclass(frozen=True)

@@ -79,4 +79,3 @@ TABLE_WRITERS: Mapping[str, Callable[[Recording, IO[bytes], Progress], None]] = 
     ".csv": _write_csv,
     ".mat": _write_mat,
 }
-"""Writers by suffix."""

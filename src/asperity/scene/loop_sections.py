@@ -91,7 +91,6 @@ HANDS: dict[str, SectionKind] = {
     ),
     "moved": SectionKind("the handle follows the motion, whatever the force", PrescribedHand),
 }
-"""Kinds of [hand]."""
 
 MOTIONS: dict[str, SectionKind] = {
     "still": SectionKind("the anchor does not move", Stationary, _read("still", Stationary)),
@@ -100,10 +99,8 @@ MOTIONS: dict[str, SectionKind] = {
     ),
     "path": SectionKind("the anchor follows the positions in a file", read_path, _read("path")),
 }
-"""Kinds of [motion]."""
 
 RUN_ARGUMENTS = _read("run")
-"""Arguments of [run]."""
 _RUN = {argument.name: argument for argument in RUN_ARGUMENTS}
 DURATION = _RUN["duration"]
 BRAKES = _RUN["brakes"]

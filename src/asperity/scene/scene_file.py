@@ -18,7 +18,6 @@ from asperity.textures import catalogue
 from asperity.textures.texture import Texture
 
 TEXTURE_KINDS = catalogue.KINDS
-"""Texture kinds of the section [texture]."""
 DEVICE_ID = Argument("device.id", "device of the catalogue", form="text")
 LOOP_SECTIONS = ("hand", "motion", "run", "servo")
 SECTIONS = ("texture", "surface", "device", *LOOP_SECTIONS)

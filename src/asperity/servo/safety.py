@@ -132,7 +132,6 @@ def check_passivity_damping(safety: Safety, device: Device, servo: Servo) -> Non
 
 
 DEFAULT_SAFETY = Safety()
-"""Limits by default."""
 
 
 def excess_stiffness_reason(surface: Surface, device: Device, *, keeps_margin: bool = False) -> str:

@@ -128,7 +128,6 @@ RUN_KINDS = {
         RunKind("bake", render_on_device, _bake, (), ("size [B]", "q"), takes_laws=False),
     )
 }
-"""Runs by name."""
 
 
 def find_run(name: str) -> RunKind:

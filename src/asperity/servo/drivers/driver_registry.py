@@ -12,7 +12,6 @@ DEVICE_DRIVER = "real"
 DRIVER_KINDS: dict[str, DriverKind] = {
     module.KIND.name: module.KIND for module in (haply, force_dimension, open_haptics, library)
 }
-"""The drivers of real devices by name."""
 _OTHER_DRIVERS = ("simulated", "replay:run.mcap", DEVICE_DRIVER)
 _LIBRARY_SUFFIXES = (".so", ".dylib", ".dll")
 
