@@ -47,12 +47,7 @@ def check_unity(
 
 
 def unity_files(request: ExportRequest, _stem: str) -> dict[str, str]:
-    """Return the files of the folder by name, the component first.
-
-    Raises:
-        ParameterError: see :func:`check_unity`.
-    """
-    check_unity(**vars(request))
+    """Return the files of the folder by name, the component first."""
     values = _placeholders(request)
     files = {
         fill_template(file, values): fill_template(load_template(f"unity/{name}"), values)
@@ -201,7 +196,6 @@ def write_files(
         ParameterError: for a file that exists, or cannot be written.
     """
     place = Path(path)
-    check_name(place, target)
     folder = target.folder(place)
     texts = target.files(request, place.stem).items()
     files = {folder / name: text for name, text in texts}
