@@ -30,7 +30,7 @@ START_STIFFNESS = 250.0
 _DEFAULT_HAND = {"kind": "spring", "stiffness": "800 N/m", "damping": "5 N*s/m", "mass": "50 g"}
 _STILL_MOTION = {"kind": "still", "point": [0, 0, 0]}
 # A simulated device is harmless: late samples do not end its loop.
-_RELAXED_GUARDS = {"lateness": 60.0, "silence": 10.0, "ramp": 0.1}
+_RELAXED_GUARDS = Safety(ramp=0.1, lateness=60.0, silence=10.0, beyond_depth="warn")
 
 MAX_DELAY = 100
 RANGES: dict[str, tuple[float, float]] = {
@@ -188,7 +188,7 @@ def _with_device(state: SceneState, name: str) -> SceneState:
         raise ParameterError("device", "must be a device of the catalogue", name)
     delay = state.electronics.delay
     surface = state.setup.surface
-    scene = _build_scene_state(Scene(surface.texture), load_device(name), state.source)
+    scene = make_scene_state(Scene(surface.texture), state.source, device=load_device(name))
     setup = replace(scene.setup, surface=surface, hand=state.setup.hand)
     return _with_delay(replace(state, setup=setup), delay)
 
@@ -235,8 +235,19 @@ def make_scene_state(
     Raises:
         ParameterError: for a scene that cannot be simulated.
     """
+    defaults = {"law": find_law(START_LAW), STIFFNESS.name: START_STIFFNESS, "clamp": "backed"}
+    hand = scene.loop.get("hand", _DEFAULT_HAND)
+    if hand.get("kind") == "moved":
+        hand = _DEFAULT_HAND
+    run = {**scene.loop.get("run", {}), "duration": "1 s"}  # required, and not used
+    loop = {**scene.loop, "hand": hand, "motion": _STILL_MOTION, "run": run}
     used = device or scene.device or load_device(DEFAULT_DEVICE)
-    return _build_scene_state(scene, used, source, surface)
+    complete, assumed = with_assumed_mass(used)
+    arguments = {**defaults, **scene.surface, **(surface or {})}
+    setup = make_setup(replace(scene, loop=loop), surface=arguments, device=complete)
+    assumptions = (*assumed, *setup.assumptions)
+    setup = replace(setup, safety=_RELAXED_GUARDS, assumptions=assumptions)
+    return SceneState(setup, source, scene.texture, (source, scene.texture))
 
 
 def make_device_scene_state(setup: Setup, device_servo: Servo, source: str) -> SceneState:
@@ -249,23 +260,6 @@ def make_device_scene_state(setup: Setup, device_servo: Servo, source: str) -> S
     """
     texture = setup.surface.texture
     return SceneState(setup, source, texture, (source, texture), device_servo=device_servo)
-
-
-def _build_scene_state(
-    scene: Scene, device: Device, source: str, surface: Mapping[str, Any] | None = None
-) -> SceneState:
-    defaults = {"law": find_law(START_LAW), STIFFNESS.name: START_STIFFNESS, "clamp": "backed"}
-    hand = scene.loop.get("hand", _DEFAULT_HAND)
-    if hand.get("kind") == "moved":
-        hand = _DEFAULT_HAND
-    run = {**scene.loop.get("run", {}), "duration": "1 s"}  # required, and not used
-    loop = {**scene.loop, "hand": hand, "motion": _STILL_MOTION, "run": run}
-    complete, assumed = with_assumed_mass(device)
-    arguments = {**defaults, **scene.surface, **(surface or {})}
-    setup = make_setup(replace(scene, loop=loop), surface=arguments, device=complete)
-    guards = {**vars(Safety()), **_RELAXED_GUARDS, "beyond_depth": "warn"}
-    setup = replace(setup, safety=Safety(**guards), assumptions=(*assumed, *setup.assumptions))
-    return SceneState(setup, source, scene.texture, (source, scene.texture))
 
 
 SCENE_KEY = "saved_scene"
