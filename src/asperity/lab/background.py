@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ _STATE: dict[str, Surface] = {}
 _NICENESS = 10  # lower priority than the loop and the page
 
 
-class BackgroundWorker:
+class BackgroundWorker(AbstractContextManager["BackgroundWorker"]):
     """A process that computes one task at a time; a context manager.
 
     If the process dies, of a crash in compiled code or for lack of memory, the pending task raises
@@ -61,9 +61,6 @@ class BackgroundWorker:
         is_broken = not result.cancelled() and isinstance(result.exception(), BrokenProcessPool)
         if is_broken and self._pool is pool:
             self._pool = self._new_pool()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown()

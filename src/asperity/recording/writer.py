@@ -11,9 +11,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +33,7 @@ MAX_WAIT = 0.5
 _BLOCK_ROWS = 4096
 
 
-class RecordingWriter:
+class RecordingWriter(AbstractContextManager["RecordingWriter"]):
     """Writes a recording.
 
     The file is created with a complete header and replaces an existing one. Rows are buffered: call
@@ -163,9 +163,6 @@ class RecordingWriter:
             requirement = f"{reason}: {self.rows} rows are in {self._path}"
             raise ParameterError(self._argument, requirement) from None
         self._size += sum(map(len, parts))
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -14,10 +14,10 @@ import math
 import os
 import sys
 import tempfile
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -130,7 +130,7 @@ def anchor_segment(device: SimulatedDevice) -> tuple[float, float, float, float,
     return ax, ay, az, at[ANCHOR, 0], at[ANCHOR, 1], at[ANCHOR, 2]
 
 
-class PointerHand:
+class PointerHand(AbstractContextManager["PointerHand"]):
     """The memory through which a pointer moves a hand; use it in a ``with``.
 
     One process writes requests and one loop follows them, without locks: each number is written
@@ -220,9 +220,6 @@ class PointerHand:
             self._table = None
             with suppress(OSError):  # some systems do not remove files in use
                 os.remove(self.name)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
