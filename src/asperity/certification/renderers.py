@@ -53,15 +53,12 @@ class Renderer(Protocol):
 
     def forces(self, paths: FloatArray) -> FloatArray:
         """Return forces [N] along paths [m], each after a reset, shape (n, m, 3) both."""
-        ...
 
     def call_times(self, points: FloatArray) -> FloatArray:
         """Return the time of a call at each point [s], shape (n,)."""
-        ...
 
     def close(self) -> None:
         """Release the renderer."""
-        ...
 
 
 @dataclass(frozen=True)

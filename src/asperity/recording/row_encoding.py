@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
-from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.errors import ParameterError, find_named
 from asperity.recording.mcap import CHANNEL, DamagedError
 
 Columns = tuple[tuple[str, str], ...]
@@ -141,10 +141,8 @@ def find_column(columns: Columns, name: str) -> int:
     Raises:
         ParameterError: for a name that no column has; the nearest are offered.
     """
-    names = [known for known, _unit in columns]
-    if name not in names:
-        raise ParameterError("column", f"is unknown: {name!r}; {suggest_names(name, names)}")
-    return names.index(name)
+    places = {known: place for place, (known, _unit) in enumerate(columns)}
+    return find_named("column", name, places)
 
 
 class NamedColumns:

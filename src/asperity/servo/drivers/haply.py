@@ -21,7 +21,7 @@ from asperity.core.errors import ParameterError
 from asperity.core.platform.clocks import system_time
 from asperity.core.platform.priority import request_thread_priority
 from asperity.core.platform.wakeup import Wakeup
-from asperity.servo.driver import AWAY, RIGHT, UP, DriverKind
+from asperity.servo.driver import AWAY, RIGHT, UP, DriverKind, Vector
 from asperity.servo.drivers import threaded
 from asperity.servo.drivers.threaded import FORCE_TIMEOUT, LOOP_SILENT, STALE, ThreadedDevice
 from asperity.servo.drivers.websocket_client import ProtocolError, WebSocketClient
@@ -35,7 +35,6 @@ KEEP_ALIVE = 5e-3
 MAX_PENDING = 4
 """Largest number of messages without an answer."""
 _ZERO_FORCE = (0.0, 0.0, 0.0)
-Force = tuple[float, float, float]
 
 
 def parse_states(message: bytes) -> list[dict[str, Any]]:
@@ -55,7 +54,7 @@ def parse_states(message: bytes) -> list[dict[str, Any]]:
     raise ValueError(f"a message of another format: {message[:60]!r}")
 
 
-def cursor_position(state: dict[str, Any]) -> Force:
+def cursor_position(state: dict[str, Any]) -> Vector:
     """Return the position of a device [m]; a missing coordinate is 0.
 
     Raises:
@@ -73,7 +72,7 @@ def cursor_position(state: dict[str, Any]) -> Force:
     raise ValueError(f"a state without a position: {str(state)[:60]}")
 
 
-def force_message(device: str, force: Force) -> str:
+def force_message(device: str, force: Vector) -> str:
     """Return the message that commands a force [N]."""
     commands = {"set_cursor_force": {"values": dict(zip("xyz", force, strict=True))}}
     return json.dumps({"inverse3": [{"device_id": device, "commands": commands}]})
@@ -167,7 +166,7 @@ class HaplyThread(threading.Thread):
             self._last_force_time = command_time
             self._send(force)
 
-    def _send(self, force: Force) -> None:
+    def _send(self, force: Vector) -> None:
         self._pending.append(system_time())
         self._connection.send(force_message(self._device_id, force))
         self._last_force = force
