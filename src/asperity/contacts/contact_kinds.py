@@ -246,28 +246,12 @@ class NearestContact(Contact):
         """
         import mpmath
 
-        start = texture.nearest([[float(c) for c in p]])[0]
-        fx = mpmath.mpf(start[0])
-        fy = mpmath.mpf(start[1])
-        for _ in range(60):
+        def conditions(fx: Any, fy: Any) -> list[Any]:
             gap = h(fx, fy, 0, 0) - p[2]
-            hx = h(fx, fy, 1, 0)
-            hy = h(fx, fy, 0, 1)
-            hxx = h(fx, fy, 2, 0)
-            hxy = h(fx, fy, 1, 1)
-            hyy = h(fx, fy, 0, 2)
-            a = fx - p[0] + gap * hx
-            b = fy - p[1] + gap * hy
-            qxx = 1 + hx * hx + gap * hxx
-            qxy = hx * hy + gap * hxy
-            qyy = 1 + hy * hy + gap * hyy
-            det = qxx * qyy - qxy * qxy
-            sx = (qxy * b - qyy * a) / det
-            sy = (qxy * a - qxx * b) / det
-            fx = fx + sx
-            fy = fy + sy
-            if abs(sx) + abs(sy) <= mpmath.eps * (abs(fx) + abs(fy) + abs(gap)):
-                break
+            return [fx - p[0] + gap * h(fx, fy, 1, 0), fy - p[1] + gap * h(fx, fy, 0, 1)]
+
+        start = texture.nearest([[float(c) for c in p]])[0]
+        fx, fy = mpmath.findroot(conditions, start[:2].tolist(), verify=False)
         away = [fx - p[0], fy - p[1], h(fx, fy, 0, 0) - p[2]]
         distance = mpmath.sqrt(sum(part**2 for part in away))
         return (distance if h(p[0], p[1], 0, 0) > p[2] else -distance), fx, fy
