@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -248,8 +248,6 @@ def _laplace_system(
     return matrix, right
 
 
-ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
-
 DEFAULT_FRACTION = 0.1
 """Default width of the band, as a fraction of each side."""
 
@@ -340,7 +338,7 @@ def blend_borders(heights: FloatArray, samples: tuple[int, ...]) -> tuple[FloatA
     """
     jump = 0.0
     for axis, band in zip(range(heights.ndim - 1, -1, -1), samples, strict=True):
-        lines = _move_axis_first(heights, axis)
+        lines = np.swapaxes(heights, 0, axis)
         jump = max(jump, float(np.abs(lines[0] - lines[-1]).max()))
         heights = _blend_axis(heights, band, axis)
     return heights, jump
@@ -366,10 +364,10 @@ def make_periodic(
     samples = to_blend_samples(heights.shape, pitch, width)
     periodic, jump = blend_borders(heights, samples)
     for axis, band in zip(range(heights.ndim - 1, -1, -1), samples, strict=True):
-        every = _move_axis_first(filled_mask, axis)
+        every = np.swapaxes(filled_mask, 0, axis)
         mask = every[:-band].copy()
         mask[:band] |= every[-band:]
-        filled_mask = _move_axis_first(mask, axis)
+        filled_mask = np.swapaxes(mask, 0, axis)
     widths = format_lengths([w * p for w, p in zip(samples, pitch, strict=True)])
     if width is None:
         widths += " (a tenth of each side)"
@@ -381,15 +379,10 @@ def make_periodic(
     return periodic, filled_mask, sentence
 
 
-def _move_axis_first(values: ArrayT, axis: int) -> ArrayT:
-    """Return a view with the given axis first; for one or two axes it is its own inverse."""
-    return values if axis == 0 else values.T
-
-
 def _blend_axis(heights: FloatArray, band: int, axis: int) -> FloatArray:
-    every = _move_axis_first(heights, axis)
+    every = np.swapaxes(heights, 0, axis)
     s = np.arange(1, band + 1) / (band + 1.0)
     weight = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2)).reshape(-1, *(1,) * (heights.ndim - 1))
     result = np.array(every[:-band])
     result[:band] = weight * every[:band] + (1.0 - weight) * every[-band:]
-    return np.ascontiguousarray(_move_axis_first(result, axis))
+    return np.ascontiguousarray(np.swapaxes(result, 0, axis))
