@@ -51,39 +51,20 @@ def gaussian_filter(
         >>> bool(np.allclose(gaussian_filter(wave, (1.0,), 8.0), wave / 2))
         True
     """
-    smooth = np.array(heights, dtype=np.float64)
-    lowpass_in_place(smooth, pitch, cutoff, periodic=periodic)
-    return smooth
-
-
-def lowpass_in_place(
-    heights: FloatArray, pitch: Pitch, cutoff: float, *, periodic: bool = False
-) -> None:
-    """Filter heights in place; see :func:`gaussian_filter`.
-
-    The Gaussian is separable: each axis is transformed separately.
-    """
     from scipy.fft import dct, idct, irfft, rfft, rfftfreq
 
-    for axis, step in zip(range(heights.ndim - 1, -1, -1), pitch, strict=True):
-        n = heights.shape[axis]
+    smooth = np.array(heights, dtype=np.float64)
+    # The Gaussian is separable: each axis is transformed separately.
+    for axis, step in zip(range(smooth.ndim - 1, -1, -1), pitch, strict=True):
+        n = smooth.shape[axis]
         frequency = rfftfreq(n, step) if periodic else np.arange(n) / (2.0 * (n - 1) * step)
         transmission = np.exp(-np.pi * (ALPHA * cutoff * frequency) ** 2)
-        response = transmission[:, None] if axis < heights.ndim - 1 else transmission
+        response = transmission[:, None] if axis < smooth.ndim - 1 else transmission
         if periodic:
-            heights[...] = irfft(response * rfft(heights, axis=axis), n, axis=axis)
+            smooth[...] = irfft(response * rfft(smooth, axis=axis), n, axis=axis)
         else:
-            heights[...] = idct(response * dct(heights, 1, axis=axis), 1, axis=axis)
-
-
-def highpass_in_place(
-    heights: FloatArray, pitch: Pitch, cutoff: float, *, periodic: bool = False
-) -> None:
-    """Apply the complementary high-pass of :func:`gaussian_filter` in place.
-
-    The transmission at wavelength l is 1 - exp(-pi (ALPHA cutoff / l)^2).
-    """
-    heights -= gaussian_filter(heights, pitch, cutoff, periodic=periodic)
+            smooth[...] = idct(response * dct(smooth, 1, axis=axis), 1, axis=axis)
+    return smooth
 
 
 @dataclass(frozen=True)
@@ -148,10 +129,10 @@ def apply_filters(
     part = "21" if heights.ndim == 1 else "61"
     short = format_length(cutoffs.short)
     steps = [f"filtered: Gaussian ISO 16610-{part}, cut-off {short}{cutoffs.note}"]
-    lowpass_in_place(heights, pitch, cutoffs.short, periodic=periodic)
+    heights[...] = gaussian_filter(heights, pitch, cutoffs.short, periodic=periodic)
     record(f"S-filter {short}", heights, pitch, removes=True)
     if cutoffs.long is not None:
-        highpass_in_place(heights, pitch, cutoffs.long, periodic=periodic)
+        heights -= gaussian_filter(heights, pitch, cutoffs.long, periodic=periodic)
         long = format_length(cutoffs.long)
         record(f"L-filter {long}", heights, pitch, removes=True, nesting=cutoffs.long)
         steps.append(f"waviness removed: Gaussian L-filter ISO 16610-{part}, cut-off {long}")
