@@ -26,7 +26,7 @@ from asperity.core.files import (
     open_input,
     read_toml,
     to_plain_data,
-    write_text,
+    write_bytes,
     written,
     written_names,
 )
@@ -165,7 +165,7 @@ def test_failed_write_leaves_the_old_file(
 
 def test_old_content_is_visible_until_all_is_written(tmp_path: Path) -> None:
     target = tmp_path / "a.txt"
-    write_text(target, "old")
+    write_bytes("path", target, b"old")
     with open_atomic(target) as stream:
         stream.write(b"new")
         assert target.read_text() == "old"
@@ -175,7 +175,7 @@ def test_old_content_is_visible_until_all_is_written(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="the mode of a file is one of POSIX")
 def test_written_file_has_the_default_mode(tmp_path: Path) -> None:
-    write_text(tmp_path / "a.txt", "text")
+    write_bytes("path", tmp_path / "a.txt", b"text")
     (tmp_path / "b.txt").write_text("text")
     mode, expected = (stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("a.txt", "b.txt"))
     assert mode == expected
@@ -184,14 +184,14 @@ def test_written_file_has_the_default_mode(tmp_path: Path) -> None:
 def test_file_name_may_have_the_maximum_length(tmp_path: Path) -> None:
     """A temporary name with the file's name as its prefix would be too long."""
     target = tmp_path / ("a" * 255)
-    write_text(target, "text")
+    write_bytes("path", target, b"text")
     assert target.read_text() == "text"
 
 
 def test_link_is_written_through_and_stays(tmp_path: Path) -> None:
     link, real = tmp_path / "link", tmp_path / "real"
     link.symlink_to(real)
-    write_text(link, "text")
+    write_bytes("path", link, b"text")
     assert link.is_symlink()
     assert real.read_text() == "text"
 
@@ -202,7 +202,7 @@ def test_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        write_text(pipe, "text")
+        write_bytes("path", pipe, b"text")
         assert os.read(reader, 100) == b"text"
     finally:
         os.close(reader)

@@ -29,7 +29,7 @@ from rich.console import Console
 
 import asperity as asp
 from asperity.core.errors import ParameterError
-from asperity.core.files import write_text
+from asperity.core.files import write_bytes
 from asperity.recording import mcap, writer
 from asperity.recording.recording import Recording, is_recording, open_recording
 from asperity.recording.row_encoding import row_type, schema_columns, schema_text
@@ -205,7 +205,7 @@ def test_rows_are_flushed_after_half_a_second(
 
 def test_existing_file_is_replaced_only_by_a_complete_header(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    write_text(path, "precious")
+    write_bytes("path", path, b"precious")
     with pytest.raises(ParameterError, match="columns must begin"):
         RecordingWriter(path, (("x", "m"),))
     assert path.read_text() == "precious"

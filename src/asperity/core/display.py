@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import IO, TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from asperity.core.errors import ParameterError
-from asperity.core.files import open_atomic, write_bytes
+from asperity.core.files import open_output, write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -214,13 +214,8 @@ class TableFiles(Tabular):
         Raises:
             ParameterError: if the file cannot be written.
         """
-        try:
-            with open_atomic(path) as stream:
-                self._write_csv(stream)
-        except OSError as error:
-            raise ParameterError(
-                "output", f"cannot be written: {error.strerror}", str(path)
-            ) from None
+        with open_output("output", path) as stream:
+            self._write_csv(stream)
 
     def _write_csv(self, stream: IO[bytes]) -> None:
         text = io.TextIOWrapper(stream, "utf-8", newline="", write_through=True)

@@ -150,29 +150,35 @@ def _link_unnamed(descriptor: int, path: Path) -> None:
         os.close(folder)
 
 
-def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a text as UTF-8 with :func:`open_atomic`."""
-    with open_atomic(path) as stream:
-        stream.write(text.encode())
-
-
-def write_bytes(name: str, path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file with :func:`open_atomic`.
+@contextmanager
+def open_output(
+    name: str, path: str | os.PathLike[str], *, durable: bool = False
+) -> Iterator[IO[bytes]]:
+    """Open an output file with :func:`open_atomic`.
 
     Args:
         name: name of the argument, for the error message.
         path: the file.
-        content: its content.
+        durable: see :func:`open_atomic`.
+
+    Yields:
+        The stream to write to.
 
     Raises:
         ParameterError: if the file cannot be written.
     """
     try:
-        with open_atomic(path) as stream:
-            stream.write(content)
+        with open_atomic(path, durable=durable) as stream:
+            yield stream
     except OSError as error:
-        requirement = f"cannot be written: {error.strerror}"
+        requirement = f"cannot be written: {error.strerror or error}"
         raise ParameterError(name, requirement, os.fspath(path)) from None
+
+
+def write_bytes(name: str, path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file of this content; see :func:`open_output`."""
+    with open_output(name, path) as stream:
+        stream.write(content)
 
 
 def append_bytes(name: str, stream: FileIO, content: bytes, *, durable: bool = False) -> None:

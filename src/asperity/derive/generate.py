@@ -17,7 +17,6 @@ from sympy.printing.pycode import PythonCodePrinter
 from asperity.contacts.contact import parameter_name
 from asperity.contacts.symbols import ARGUMENT_ORDER, DEPTH
 from asperity.core.errors import LawError
-from asperity.core.files import write_text
 from asperity.derive.derivatives import ROOT, Derivation, derive, substitute_root
 from asperity.derive.facts import derive_facts, facts_source, generated_kernel_path
 from asperity.laws import LAWS, Law
@@ -144,7 +143,7 @@ def main(arguments: list[str]) -> int:
             continue
         stale.append(path.name)
         if "--check" not in arguments:
-            write_text(path, text)
+            path.write_bytes(text.encode())
     if "--check" in arguments and stale:
         sys.stderr.write(f"out of date, run `make kernels`: {', '.join(stale)}\n")
         return 1

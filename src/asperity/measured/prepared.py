@@ -21,8 +21,8 @@ from asperity.core.files import (
     Serializable,
     check_output,
     json_text,
-    open_atomic,
     open_input,
+    open_output,
     to_plain_data,
 )
 from asperity.measured.form import HeightStatistics
@@ -189,7 +189,7 @@ class PreparedSurface:
 def save_prepared(path: FilePath, prepared: PreparedSurface, source: FilePath) -> None:
     """Save a prepared surface as NPZ: heights, pitch, mask, steps and source.
 
-    The file is written atomically; see :func:`asperity.core.files.open_atomic`.
+    The file is written atomically; see :func:`asperity.core.files.open_output`.
 
     Args:
         path: the file to write; an existing one is replaced.
@@ -199,8 +199,7 @@ def save_prepared(path: FilePath, prepared: PreparedSurface, source: FilePath) -
     Raises:
         ParameterError: the path is the source, its folder is missing, or it cannot be written.
     """
-    target = Path(path)
-    check_output_path(target, Path(source))
+    check_output_path(Path(path), Path(source))
     filled = prepared.filled_mask
     if filled is None:
         filled = np.zeros(prepared.heights.shape, bool)
@@ -217,12 +216,8 @@ def save_prepared(path: FilePath, prepared: PreparedSurface, source: FilePath) -
         "source": np.array(Path(source).name),
         "sha256": np.array(sha256),
     }
-    try:
-        with open_atomic(target, durable=True) as file:
-            np.savez(file, **members)  # type: ignore[arg-type]  # typed as if one might be a flag
-    except OSError as error:
-        reason = f"cannot be written: {error.strerror or error}"
-        raise ParameterError("output", reason, str(path)) from None
+    with open_output("output", path, durable=True) as file:
+        np.savez(file, **members)  # type: ignore[arg-type]  # typed as if one might be a flag
 
 
 def check_output_path(path: Path, source: Path) -> None:

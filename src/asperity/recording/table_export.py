@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import IO
 
 from asperity.core.errors import ParameterError
-from asperity.core.files import json_text, open_atomic
+from asperity.core.files import json_text, open_output
 from asperity.recording.recording import Recording
 
 Progress = Callable[[float], object]
@@ -36,12 +36,8 @@ def export_recording(
     suffix = Path(path).suffix.lower()
     if suffix not in TABLE_WRITERS:
         raise ParameterError("output", f"must end in {', '.join(TABLE_WRITERS)}", str(path))
-    try:
-        with open_atomic(path) as stream:
-            TABLE_WRITERS[suffix](recording, stream, progress or (lambda _part: None))
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ParameterError("output", f"cannot be written: {reason}", str(path)) from None
+    with open_output("output", path) as stream:
+        TABLE_WRITERS[suffix](recording, stream, progress or (lambda _part: None))
 
 
 def _write_csv(recording: Recording, stream: IO[bytes], progress: Progress) -> None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.core.files import content_digest, json_text, open_atomic, open_input
+from asperity.core.files import content_digest, json_text, open_input, open_output
 from asperity.core.memory import free_memory
 from asperity.textures.fields.field_bricks import align_bricks
 from asperity.textures.fields.field_certificate import certify_gain
@@ -110,15 +110,11 @@ def save_field(path: str | os.PathLike[str], field: Texture) -> PotentialField:
     if not isinstance(field, PotentialField):
         raise ParameterError("field", "must be the texture of a baked surface", field)
     header, sections = _encode(field)
-    try:
-        with open_atomic(path, durable=True) as stream:
-            stream.write(header.tobytes())
-            for offset, section in sections:
-                stream.seek(offset)
-                stream.write(section)
-    except OSError as error:
-        reason = f"cannot be written: {error.strerror or error}"
-        raise ParameterError("output", reason, os.fspath(path)) from None
+    with open_output("output", path, durable=True) as stream:
+        stream.write(header.tobytes())
+        for offset, section in sections:
+            stream.seek(offset)
+            stream.write(section)
     return field
 
 
