@@ -98,8 +98,6 @@ def _local_median(padded: FloatArray, shape: Shape) -> FloatArray:
     box = (2 * reach + 1,) * len(shape)
     inner = (slice(reach, -reach),) * len(shape)
     missing = np.isnan(padded)
-    if not missing.any():
-        return np.array(median_filter(padded, size=box)[inner])
     medians = np.array(median_filter(np.where(missing, 0.0, padded), size=box)[inner])
     near = binary_dilation(missing, np.ones(box, bool))[inner] & ~missing[inner]
     for block, windows in _iter_windows(padded, shape, np.nonzero(near)):
