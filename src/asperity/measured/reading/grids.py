@@ -49,11 +49,9 @@ def _map_file(path: Path) -> np.ndarray[Any, np.dtype[Any]]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # headers of NumPy under Python 2 are accepted
-            array = np.load(path, mmap_mode="r", allow_pickle=False)
+            array: np.ndarray[Any, np.dtype[Any]] = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # NumPy documents no list of errors for damaged headers
         raise SurfaceFileError(_describe_error(error, path)) from error
-    if not isinstance(array, np.ndarray):
-        raise SurfaceFileError("not a single NumPy array")
     return array
 
 

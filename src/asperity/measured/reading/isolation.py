@@ -59,12 +59,11 @@ def read_isolated(
             fault = f"ends its reader with {end}: damaged, or not what it seems"
             raise SurfaceFileError(f"{file.name} {fault}")
         output.seek(0)
-        result = pickle.load(output)
+        result: RawSurface | Exception | None = pickle.load(output)
     if isinstance(result, MemoryError):
         raise _limit_error(file, f"{memory / 1e9:.1f} GB")
     if isinstance(result, Exception):
         raise result
-    assert result is None or isinstance(result, RawSurface)
     return result
 
 

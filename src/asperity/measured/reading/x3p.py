@@ -230,9 +230,7 @@ def _parse_tree(content: bytes, notes: list[str]) -> ET.Element:
 def _parse_xml(content: bytes) -> ET.Element:
     parser = ET.XMLParser(target=_Builder())
     parser.feed(content)
-    root = parser.close()
-    assert isinstance(root, ET.Element)
-    return root
+    return parser.close()
 
 
 def _text(root: ET.Element, path: str) -> str:

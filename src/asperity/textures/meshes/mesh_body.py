@@ -323,8 +323,6 @@ def find_faults(vertices: FloatArray, faces: NDArray[np.int32]) -> list[MeshFaul
     faults = make_fault(DEGENERATE, vertices[faces[degenerate, 0]])
     faces = faces[~degenerate]
     keys, start, counts, sums = _edges(faces, len(vertices))
-    if len(keys) == 0:
-        return faults
     turned = (counts > 1) & (sums != 0)
     kinds = ((OPEN, counts == 1), (ORIENTATION, turned), (NON_MANIFOLD, counts > 2))
     for kind, where in kinds:
