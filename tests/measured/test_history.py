@@ -133,16 +133,15 @@ def test_history_is_saved_and_loaded(tmp_path: Path) -> None:
     assert stage_names(magnify_surface(loaded, 2.0).history)[-1] == "magnified"
 
 
-def test_file_without_history_loads_and_damaged_history_is_refused(tmp_path: Path) -> None:
+def test_missing_and_damaged_history_is_refused(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(b"x")
     save_prepared(tmp_path / "ready.npz", prepare(surface()), source)
     with np.load(tmp_path / "ready.npz") as members:
         members_without_history = {name: members[name] for name in members if name != "history"}
-    np.savez(tmp_path / "old.npz", **members_without_history)
-    loaded = load_prepared(tmp_path / "old.npz")
-    assert loaded.history == ()
-    assert magnify_surface(loaded, 2.0).history == ()
+    np.savez(tmp_path / "bad.npz", **members_without_history)
+    with pytest.raises(SurfaceFileError, match="damaged prepared surface"):
+        load_prepared(tmp_path / "bad.npz")
     for wrong in ("[", "{}", '[{"name": "x"}]', '[{"name": "x", "values": {"Q": 1}}]', "[1]"):
         np.savez(tmp_path / "bad.npz", **members_without_history, history=np.array(wrong))
         if wrong == "{}":

@@ -414,18 +414,6 @@ def content_digest(*parts: Any) -> str:
     return digest.hexdigest()
 
 
-def set_values(record: Any) -> tuple[Any, ...]:
-    """Return the values of a named tuple, without those with defaults where all have these.
-
-    So records have the digest of those before such values existed.
-    """
-    defaults = getattr(record, "_field_defaults", {})
-    count = len(record) - len(defaults)
-    if content_digest(*record[count:]) == content_digest(*defaults.values()):
-        return tuple(record[:count])
-    return tuple(record)
-
-
 def is_shipped(cls: type) -> bool:
     """Return whether a class and its bases belong to this package or to Python."""
     packages = {base.__module__.partition(".")[0] for base in cls.__mro__}

@@ -166,7 +166,7 @@ class PreparedSurface:
         steps: the preparation steps in order, one sentence each with its numbers.
         filled_mask: True for interpolated heights, same shape; None if there are none.
         periodic: whether the surface repeats after n times the pitch.
-        history: parameters of the surface as read and after each step; empty for early files.
+        history: parameters of the surface as read and after each step.
     """
 
     heights: FloatArray
@@ -281,9 +281,7 @@ def _read_archive(archive: zipfile.ZipFile) -> PreparedSurface:
         raise SurfaceFileError(f"the mask has shape {filled.shape}, the heights {heights.shape}")
     if not np.isfinite(heights).all():
         raise SurfaceFileError("has heights that are not finite")
-    history: tuple[PreparationStage, ...] = ()
-    if "history.npy" in archive.namelist():  # early files have none
-        history = parse_stages(json.loads(str(_read_member(archive, "history", "U", 0))))
+    history = parse_stages(json.loads(str(_read_member(archive, "history", "U", 0))))
     return PreparedSurface(
         np.ascontiguousarray(heights), pitch, steps, some_or_none(filled), periodic, history
     )

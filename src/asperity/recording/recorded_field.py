@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.core.files import Serializable, content_digest, set_values, text_digest, to_plain_data
+from asperity.core.files import Serializable, content_digest, text_digest, to_plain_data
 from asperity.kernels.fuse import fuse_on_texture, kernel_source
 from asperity.kernels.tick import least_limited_square
 from asperity.laws import Law, find_law
@@ -143,7 +143,7 @@ def field_metadata(surface: Surface) -> dict[str, Any]:
 
 def arguments_digest(arguments: tuple[Any, ...]) -> str:
     """Return a digest of the record that a sampler receives."""
-    return content_digest(*map(np.asarray, set_values(arguments)))
+    return content_digest(*map(np.asarray, arguments))
 
 
 def formula_digest(law: Law) -> str:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.core.files import content_digest, set_values
 from asperity.textures.fields import bake as baking
 from asperity.textures.fields import field_record as record
 from asperity.textures.fields import field_sampler as kernels
@@ -116,14 +115,6 @@ def test_bricks_are_lines_of_the_cache() -> None:
         assert bricks.nbytes == 64 * count
         assert bricks.ctypes.data % 64 == 0
     assert BRICK_VALUES + 4 * BRICK_LEVELS == 32
-
-
-def test_digest_of_a_field_without_bricks_is_that_before_there_were_any() -> None:
-    grid = FieldGrid(STEPS, (7, 6), np.zeros(2), LEVELS, 8e-6, -1e-5, 3, PERIODIC)
-    depths = random_depths(grid)
-    field = grid.arguments(depths)
-    assert content_digest(*set_values(field)) == content_digest(*field[:18])
-    assert len(set_values(grid.to_bricks(depths, field))) == 22
 
 
 @pytest.fixture(name="large")

@@ -15,7 +15,7 @@ from asperity.contacts.contact import Contact
 from asperity.core.checks import FloatArray
 from asperity.core.display import Tabular
 from asperity.core.errors import ParameterError
-from asperity.core.files import content_digest, set_values, to_plain_data
+from asperity.core.files import content_digest, to_plain_data
 from asperity.measured.lengths import format_length
 from asperity.textures.fields.field_bricks import align_bricks
 from asperity.textures.fields.field_grid import FieldGrid
@@ -312,6 +312,4 @@ class PotentialField(Texture, Tabular):
     def digest(self) -> str | None:
         """See :class:`Texture`."""
         source = self.source.digest
-        return source and content_digest(
-            source, type(self).__qualname__, *set_values(self.arguments)
-        )
+        return source and content_digest(source, type(self).__qualname__, *self.arguments)
