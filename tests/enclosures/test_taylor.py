@@ -56,7 +56,7 @@ CASES = [
     Case("**5", lambda x: x**5, lambda x: x**5),
     Case("**-3", lambda x: x**-3, lambda x: x**-3, 0.5, 3.0),
     Case("**1.5", lambda x: x**1.5, lambda x: x ** WIDE(1.5), 0.3, 3.0),
-    Case("pow", lambda x: M.pow(x, -0.7), lambda x: x ** WIDE(-0.7), 0.3, 3.0),
+    Case("pow", lambda x: x**-0.7, lambda x: x ** WIDE(-0.7), 0.3, 3.0),
     Case("abs+", lambda x: abs(x) * x, lambda x: abs(x) * x, 0.5, 2.0),
     Case("sqrt", M.sqrt, np.sqrt, 0.3, 3.0),
     Case("exp", M.exp, np.exp),
@@ -254,7 +254,7 @@ def test_numpy_scalar_on_the_left_returns_a_model() -> None:
 def test_taylor_math_of_numbers_equals_math() -> None:
     for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "tanh", "atan"):
         assert getattr(M, name)(0.3) == pytest.approx(getattr(math, name)(0.3), rel=1e-15)
-    assert (M.pow(2.0, 3.0), M.fabs(-2.0), M.copysign(1.0, -3.0)) == (8.0, 2.0, -1.0)
+    assert M.copysign(1.0, -3.0) == -1.0
     assert (M.sinh(1.0), M.cosh(1.0)) == pytest.approx((math.sinh(1.0), math.cosh(1.0)))
 
 

@@ -72,9 +72,6 @@ class TaylorModel:
     def __neg__(self) -> TaylorModel:
         return TaylorModel(-self.c, -self.g, self.e)
 
-    def __pos__(self) -> TaylorModel:
-        return self
-
     def __add__(self, other: TaylorNumber) -> TaylorModel:
         if not isinstance(other, TaylorModel):
             if other == 0.0:
@@ -294,11 +291,6 @@ class TaylorMath(metaclass=_SmoothFunctions):
         return 0.5 * np.pi - TaylorMath.asin(x)
 
     @staticmethod
-    def pow(x: TaylorNumber, power: float) -> TaylorNumber:
-        """Return x to a constant power."""
-        return x**power
-
-    @staticmethod
     def copysign(size: float, x: TaylorNumber) -> TaylorNumber:
         """Return ±size by the sign of x, or the interval between if the sign is undetermined."""
         if not isinstance(x, TaylorModel):
@@ -306,5 +298,3 @@ class TaylorMath(metaclass=_SmoothFunctions):
         definite = np.abs(x.c) > x.radius
         c = np.where(definite, np.copysign(size, x.c), 0.0)
         return TaylorModel(c, np.zeros_like(x.g), np.where(definite, 0.0, abs(size)))
-
-    fabs = staticmethod(abs)
