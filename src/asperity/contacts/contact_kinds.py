@@ -308,11 +308,9 @@ class SplitContact(NearestContact):
         return None
 
     def warm_start_code(self, needed: frozenset[str]) -> list[str]:
-        """Return the vector to the mean, computed from the atoms of the last tick."""
+        """Return the vector to the mean and the energy, from the atoms of the last tick."""
         arguments = "x, y, z, param_continuity, warm_start, texture"
-        if "energy_tk" in needed:
-            return [f"tx, ty, tz, energy_tk = split_contact_energy({arguments})"]
-        return [f"tx, ty, tz = split_contact_warm({arguments})"]
+        return [f"tx, ty, tz, energy_tk = split_contact_energy({arguments})"]
 
     def sampling_code(self, needed: frozenset[str]) -> list[str]:
         """Return the vector to the mean, with its derivative or energy if needed."""

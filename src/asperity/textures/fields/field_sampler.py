@@ -381,18 +381,10 @@ def split_contact(
     return -gx, -gy, -gz
 
 
-def split_contact_warm(
-    x: float, y: float, z: float, _continuity: float, _warm_start: FloatArray, field: FieldArguments
-) -> Vector:
-    """Return -∇T [m], without a search."""
-    gx, gy, gz = field_gradient(x, y, z, field)
-    return -gx, -gy, -gz
-
-
 def split_contact_energy(
     x: float, y: float, z: float, _continuity: float, _warm_start: FloatArray, field: FieldArguments
 ) -> tuple[float, float, float, float]:
-    """Return -∇T [m] and T [m²]."""
+    """Return -∇T [m] and T [m²], without a search."""
     gx, gy, gz, energy = field_slope(x, y, z, field)
     return -gx, -gy, -gz, energy
 

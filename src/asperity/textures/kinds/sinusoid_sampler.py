@@ -191,18 +191,6 @@ def split_contact(
     return texture.kx * shift / k2, texture.ky * shift / k2, amplitude * c - z
 
 
-def split_contact_warm(
-    x: float,
-    y: float,
-    z: float,
-    continuity: float,
-    warm_start: FloatArray,
-    texture: SinusoidArguments,
-) -> tuple[float, float, float]:
-    """Return z̄ - p; the closed form needs no warm start."""
-    return split_contact(x, y, z, continuity, texture)
-
-
 def split_contact_energy(
     x: float,
     y: float,
@@ -211,7 +199,7 @@ def split_contact_energy(
     warm_start: FloatArray,
     texture: SinusoidArguments,
 ) -> tuple[float, float, float, float]:
-    """Return z̄ - p [m] and U [m²]."""
+    """Return z̄ - p [m] and U [m²]; the closed form needs no warm start."""
     amplitude = texture.amplitude
     k2 = texture.kx * texture.kx + texture.ky * texture.ky
     u = split_phase(x, y, texture)
