@@ -28,9 +28,11 @@ from asperity.textures.spline import heightmap_sampler as heightmap
 from asperity.textures.spline import profile_sampler as profile
 from asperity.textures.spline import spline_pruning, spline_search
 
-SAMPLERS = (sinusoid, fourier, profile, heightmap, closest_search, spline_search, spline_pruning)
+SAMPLERS = (sinusoid, fourier, profile, heightmap, closest_search, spline_search)
+SEARCHES = (fourier, spline_search, spline_pruning)
 BODIES = (axes, banded, dense, five_bar, prescribed)
 PAIRS = [(sampler, one) for one in SAMPLERS] + [(body_functions, one) for one in BODIES]
+PAIRS += [(closest_search, one) for one in SEARCHES]
 
 
 def argument_counts(module: ModuleType) -> dict[str, int]:

@@ -3,14 +3,27 @@
 A texture kind implements these functions in its sampler modules and declares that they provide
 them; the linker binds the calls of contacts and searches to the implementations. ``texture`` is
 the record (NamedTuple) that the kind declares; it is passed on unchanged.
+
+For the search of closest points a kind states bounds, ``enclose_box``. It may provide more, which
+:mod:`asperity.contacts.closest_search` has defaults of:
+
+* ``search_frame`` returns the coordinates of the boxes of a probe: the point (0, 0) [m], the
+  direction of the first axis, and the units of both axes [m]; that of the second is 0 on a line.
+* ``search_region`` returns a box with every surface point whose squared distance [m²] is less.
+* ``narrow_box`` returns the part of a box that may hold a point of a ball, and the evaluations
+  left. It is empty if a first border is greater than the last one. The gap is h - z at the best
+  point.
+* ``can_prune_near`` returns whether no point of a box near a local minimum of the distance is in a
+  ball.
+* ``expand_box`` returns derivatives at the centre of a box of half-diagonal r along its axes, and
+  remainders. They bound how far Q is from its value at the centre, how far h is from the tangent
+  plane [m], and ‖D³h‖ [1/m²]; the last value is the evaluations left.
+* ``divide_box`` puts the parts of a box that may hold a point of a ball on the stack, and returns
+  the number of boxes on the stack and the evaluations left. The minimum is the best point.
+* ``box_middle`` returns where an axis of a box is halved.
 """
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from asperity.core.compiled import FloatArray
 
 _SECOND_DERIVATIVES = frozenset(("hxx", "hxy", "hyy"))
 _FIRST_DERIVATIVES = frozenset(("hx", "hy"))
@@ -102,70 +115,10 @@ def evaluation_cost(texture: object) -> float:
 
 
 def enclose_box(box: Box, texture: object) -> Bounds:
-    """Return bounds of the surface on a box, in the coordinates of :func:`search_frame`.
+    """Return bounds of the surface on a box, in the coordinates of ``search_frame``.
 
     They are the least and the greatest height [m], infinite if unknown, K >= ‖Hess h‖ [1/m],
     T >= ‖D³h‖ [1/m²], a bound of the greatest eigenvalue of -Hess h, at least 0 and at most K, and
     what to do with the box: ``DIVIDE``, ``EXPAND`` or ``DESCEND``.
     """
-    raise NotImplementedError  # the linker binds calls to the implementation
-
-
-def search_frame(x: float, y: float, texture: object) -> Frame:
-    """Return the coordinates of the boxes of a probe.
-
-    They are the point (0, 0) [m], the direction of the first axis, and the units of both axes [m];
-    that of the second is 0 on a line.
-    """
-    raise NotImplementedError  # the linker binds calls to the implementation
-
-
-def search_region(x: float, y: float, z: float, square: float, texture: object) -> Box:
-    """Return a box with every surface point whose squared distance [m²] is less."""
-    raise NotImplementedError  # the linker binds calls to the implementation
-
-
-def narrow_box(ball: Ball, gap: float, box: Box, left: float, texture: object) -> tuple[Box, float]:
-    """Return the part of a box that may hold a point of a ball, and the evaluations left.
-
-    It is empty if a first border is greater than the last one. The gap is h - z at the best point.
-    """
-    raise NotImplementedError  # the linker binds calls to the implementation
-
-
-def can_prune_near(ball: Ball, minimum: Minimum, box: Box, texture: object) -> bool:
-    """Return whether no point of a box near a local minimum of the distance is in a ball."""
-    raise NotImplementedError  # the linker binds calls to the implementation
-
-
-def expand_box(
-    x: float, y: float, z: float, r: float, bounds: Bounds, left: float, texture: object
-) -> tuple[Derivatives, tuple[float, float, float], float]:
-    """Return derivatives at the centre of a box of half-diagonal r along its axes, and remainders.
-
-    The remainders bound how far Q is from its value at the centre, how far h is from the tangent
-    plane [m], and ‖D³h‖ [1/m²]; the last value is the evaluations left.
-    """
-    raise NotImplementedError  # the linker binds calls to the implementation
-
-
-def divide_box(
-    ball: Ball,
-    frame: Frame,
-    minimum: Minimum,
-    box: Box,
-    stack: FloatArray,
-    count: int,
-    left: float,
-    texture: object,
-) -> tuple[int, float]:
-    """Put the parts of a box that may hold a point of a ball on the stack.
-
-    Return the number of boxes on the stack and the evaluations left. The minimum is the best point.
-    """
-    raise NotImplementedError  # the linker binds calls to the implementation
-
-
-def box_middle(low: float, high: float, axis: int, texture: object) -> float:
-    """Return where an axis of a box is halved."""
     raise NotImplementedError  # the linker binds calls to the implementation
