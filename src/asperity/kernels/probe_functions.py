@@ -31,20 +31,6 @@ def probe_force(
     raise NotImplementedError  # the linker binds calls to the generated function
 
 
-def probe_force_warm(
-    x: float,
-    y: float,
-    z: float,
-    dx: float,
-    dy: float,
-    warm_start: FloatArray,
-    texture: object,
-    law: object,
-) -> Vector3:
-    """Return the force [N] of a law whose contact has a warm-started search."""
-    raise NotImplementedError  # the linker binds calls to the generated function
-
-
 def probe_jacobian(
     x: float,
     y: float,
