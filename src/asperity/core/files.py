@@ -21,7 +21,7 @@ from functools import lru_cache
 from importlib.metadata import version
 from io import BufferedReader, FileIO
 from pathlib import Path
-from typing import IO, Any, TypeVar, overload
+from typing import IO, Any, TypeVar
 
 from asperity.core.errors import ParameterError, escape_unprintable
 
@@ -230,10 +230,6 @@ def text_digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-@overload
-def to_plain_data(value: Mapping[str, Any], infinity: str | None = "inf") -> dict[str, Any]: ...
-@overload
-def to_plain_data(value: Any, infinity: str | None = "inf") -> Any: ...
 def to_plain_data(value: Any, infinity: str | None = "inf") -> Any:
     """Return a value as JSON types: dictionaries, lists, strings, numbers, booleans and None.
 

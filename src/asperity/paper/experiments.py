@@ -229,9 +229,12 @@ class Experiments:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return to_plain_data(
-            {"V.A": self.passivity, "V.B": self.scanning, "V.C": self.bump, "beyond": self.devices}
-        )
+        return {
+            "V.A": to_plain_data(self.passivity),
+            "V.B": to_plain_data(self.scanning),
+            "V.C": to_plain_data(self.bump),
+            "beyond": to_plain_data(self.devices),
+        }
 
 
 def run_experiments(
