@@ -250,6 +250,20 @@ def _draw_card_map(axes: Axes, texture: Texture) -> None:
     _draw_scale_bar(axes, float(size[0]))
 
 
+def _draw_scale_bar(axes: Axes, width: float) -> None:
+    """Draw a bar of a round length in the lower right corner of a map of that width [m]."""
+    unit = style.length_unit(width)
+    length = style.nice_length(0.22 * width)
+    right = 0.97
+    span = length / width
+    for colour, thickness in (("white", 6.0), (style.INK, 3.0)):
+        options: dict[str, Any] = {"color": colour, "lw": thickness, "solid_capstyle": "butt"}
+        axes.plot([right - span, right], [0.06, 0.06], transform=axes.transAxes, **options)
+    text = f"{length * unit.scale:g} {unit.name}"
+    middle = right - 0.5 * span
+    style.add_note(axes, text, (middle, 0.085), ha="center", va="bottom", color=style.INK)
+
+
 def _draw_card_section(axes: Axes, texture: Texture) -> None:
     line = texture.scan_line()
     periods = 3.0 if texture.is_profile and texture.peak_to_valley > 0.05 * line.length else 1.0
