@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,8 @@ def _filtered(line: list[int], above: list[int], step: int, kind: int) -> list[i
         a = line[k - step] if k >= step else 0
         b = above[k]
         c = above[k - step] if k >= step else 0
-        paeth = min((a, b, c), key=lambda q, p=a + b - c: abs(p - q))
+        distances = {q: abs(a + b - c - q) for q in (a, b, c)}
+        paeth = min(distances, key=distances.__getitem__)
         out.append((value - (0, a, b, (a + b) // 2, paeth)[kind]) % 256)
     return out
 
@@ -79,7 +80,7 @@ def write_tiff(
     tags: dict[int, tuple[int, bytes]] | None = None,
 ) -> Path:
     """Write an uncompressed TIFF of one strip a page; tags: code -> (type, value bytes)."""
-    order = ">" if big_endian else "<"
+    order: Literal["<", ">"] = ">" if big_endian else "<"
     pixels = values[..., None] if values.ndim == 2 else values
     rows, columns, channels = pixels.shape
     data = pixels.astype(pixels.dtype.newbyteorder(order)).tobytes()
