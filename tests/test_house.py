@@ -226,7 +226,7 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 MAX_STATEMENTS = 44_265
 """Statements of the package without docstrings; packing or unpacking lines does not change them."""
 
-MAX_OTHER_LINES = 7_603
+MAX_OTHER_LINES = 7_566
 """Lines with text in the package's files that are not Python."""
 
 MAX_PYTHON_FILES = 401

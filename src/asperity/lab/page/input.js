@@ -18,7 +18,7 @@ export function followPointer(canvas, host, moveHand) {
     hand.isPressed = event.buttons > 0;
     hand.pressure = event.pointerType === "pen" ? 2 * event.pressure : 1;
     moveHand(event);
-    hand.requestMotion(event.timeStamp);
+    hand.requestMotion();
   };
   canvas.onpointerdown = event => { canvas.setPointerCapture(event.pointerId); follow(event); };
   canvas.onpointermove = canvas.onpointerup = follow;

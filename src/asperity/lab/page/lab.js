@@ -5,7 +5,6 @@ import { followPointer, obeyKeys } from "./input.js";
 import { Pictures } from "./pictures.js";
 import { PointerHand } from "./pointer_hand.js";
 import { DeviceHandle } from "./device_handle.js";
-import { LatencyMonitor } from "./latency.js";
 import { fromSliderValue, showLimit, toSliderFraction } from "./stiffness_slider.js";
 import { Connection } from "./connection.js";
 import { download, toPng, toSvg } from "./image_export.js";
@@ -30,7 +29,7 @@ const MIN_VIEW_WIDTH = 5e-4, MAX_VIEW_WIDTH = 0.06; // m
 const MAX_ASPECT = 3; // height over width of a section, whose sides the server limits
 const relief = new ReliefView($("relief")), section = new SectionView($("section"));
 const traces = new TracePlot($("traces")), spectrum = new SpectrumPlot($("spectrum")), sound = new ForceSound();
-const energyMeter = new EnergyMeter(), quietContact = new QuietContact(), latencyMonitor = new LatencyMonitor();
+const energyMeter = new EnergyMeter(), quietContact = new QuietContact();
 
 let status = null, frame = null, viewWidth = 8e-3, viewCentre = [0, 0], isFirstStatus = true;
 let laws = []; // of the server, with their parameters
@@ -91,11 +90,8 @@ const connection = new Connection({
 });
 
 const pictures = new Pictures((kind, content) => connection.send(kind, content), { relief, section });
-const hand = new PointerHand((type, payload) => {
-  const isSent = Boolean(status?.has_control && !status.handle) && connection.send(type, payload);
-  if (isSent) latencyMonitor.addRequest(hand.requestCount + 1, hand.inputTime);
-  return isSent;
-});
+const hand = new PointerHand((type, payload) =>
+  Boolean(status?.has_control && !status.handle) && connection.send(type, payload));
 const handle = new DeviceHandle(type => connection.send(type));
 const tour = new Tour({
   changeScene, hand, energyMeter, get status() { return status; },
@@ -286,7 +282,6 @@ function isDue(task, time, interval) {
 
 function paint(time) {
   requestAnimationFrame(paint);
-  latencyMonitor.recordPresented();
   connection.readBuffer();
   const state = probeState();
   if (frame && frame.number !== paintedFrame) {
@@ -297,7 +292,6 @@ function paint(time) {
   section.draw(state, sectionBox());
   secondLane.drawSection(sectionBox());
   if (isDue("traces", time, 60)) drawTraces();
-  latencyMonitor.recordDrawn(frame?.acknowledged ?? 0);
   if (isDue("requestPictures", time, 200)) requestPictures(state);
   if (state && isDue("texts", time, 150)) updateTexts(state);
 }
@@ -401,7 +395,7 @@ requestAnimationFrame(paint);
 // For the tests and for the console of the browser.
 globalThis.lab = {
   connection, hand, pictures, quietContact, tour, energyMeter, relief, section, traces, probeState, sectionBox,
-  latencies: latencyMonitor.latencies, toSvg: () => toSvg(views()), toPng: () => toPng(views()), secondLane,
+  toSvg: () => toSvg(views()), toPng: () => toPng(views()), secondLane,
   get viewWidth() { return viewWidth; }, get frame() { return frame; }, get status() { return status; },
   get errorCount() { return errorCount; },
   /** Whether both views have a picture. */

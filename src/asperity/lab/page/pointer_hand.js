@@ -72,17 +72,13 @@ export class PointerHand {
     return point;
   }
 
-  /**
-   * Send the trajectory to the server, now or once the least interval has passed.
-   * @param inputTime time of the user's input, from which the latency is measured [ms]
-   */
-  requestMotion(inputTime = performance.now()) {
-    this.inputTime = inputTime;
+  /** Send the trajectory to the server, now or once the least interval has passed. */
+  requestMotion() {
     if (this.isRequestPending) return;
     const delay = this.lastRequestTime + REQUEST_INTERVAL - performance.now();
     if (delay > 0) {
       this.isRequestPending = true;
-      setTimeout(() => { this.isRequestPending = false; this.requestMotion(this.inputTime); }, delay);
+      setTimeout(() => { this.isRequestPending = false; this.requestMotion(); }, delay);
       return;
     }
     this.lastRequestTime = performance.now();
