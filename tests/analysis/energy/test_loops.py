@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from asperity.analysis import loop_work
-from asperity.analysis.energy.field_energy import initial_panels
+from asperity.analysis import loop_work, worst_loop
+from asperity.analysis.energy.field_energy import TooSteepError, initial_panels, integrate
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -139,6 +139,35 @@ def test_friction_loop_is_the_limit_of_small_steps() -> None:
         errors.append(abs(stepped - exact))
     assert errors[1] < 1e-4 * abs(exact)
     assert math.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.5)  # first order
+
+
+GROOVES = Sinusoid(0.2e-3, 1e-3, phase=0.3, direction=(3.0, 1.0))
+FLAT = HeightMap(np.full((4, 5), 0.3e-3), 0.25e-3)
+
+
+@pytest.mark.parametrize("letter", "ABCDEG")
+@pytest.mark.parametrize("shift", [0.0, 1.0])
+def test_work_along_grooves_is_zero_up_to_rounding(letter: str, shift: float) -> None:
+    """Nothing but rounding acts along them: halving panels does not lower its error."""
+    surface = Surface(GROOVES, letter, stiffness=K, max_depth=0.2e-3)
+    path = [[shift, 0.0, -1e-4], [shift - 1e-3, 3e-3, -1e-4]]
+    assert abs(loop_work(surface, path)) < 1e-12 * (1.0 + 1e3 * shift) * K * 0.2e-3 * 3e-3
+
+
+@pytest.mark.parametrize("letter", "ABCG")
+def test_flat_map_has_no_leak_but_rounding(letter: str) -> None:
+    surface = Surface(FLAT, letter, stiffness=K)
+    assert surface.max_depth == 1e-3
+    leak = worst_loop(surface)
+    assert abs(leak.energy) < 1e-10 * K * 1e-6  # tolerances of the edges of its loop
+    assert abs(leak.thrust or 0.0) < 1e-12 * K * 1e-3
+
+
+def test_integrand_that_is_noise_alone_is_refused() -> None:
+    noise = np.random.default_rng(5)
+    with pytest.raises(TooSteepError, match="tolerance cannot be reached"):
+        integrate(lambda s: noise.normal(size=len(s)), 4)
+    assert abs(integrate(lambda s: noise.normal(size=len(s)), 4, rounding=10.0)) < 10.0
 
 
 def test_initial_panels_are_two_per_wavelength() -> None:

@@ -222,9 +222,8 @@ def three_scales() -> Figure:
 
 @needs_browser
 def test_script_and_svg_positions_agree_on_every_scale(tmp_path: Path) -> None:
-    figure = three_scales()
     text = render_page(
-        Page("title", "answer", [], [picture_section("One", figure, "Three lines.")])
+        Page("title", "answer", [], [picture_section("One", three_scales, "Three lines.")])
     )
     script = """
     const panels = JSON.parse(document.querySelector("figure script").textContent);

@@ -169,6 +169,8 @@ _MAX_REFINEMENTS = 52
 _MAX_PANELS = 4096
 # Panels at once: some 200 MB, and seconds. A loop around a map of 2048 nodes has 35 000.
 _MAX_TOTAL_PANELS = 200_000
+# Rounding of a force, over that of the heights and places that it follows from.
+_FORCE_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 # From this number of edges on each edge is short.
 _MANY_EDGES = 64
 
@@ -287,7 +289,20 @@ def _field_work(
         points = starts[which] + (s - which)[:, None] * along[which]
         return np.asarray(np.einsum("ni,ni->n", surface.force(points), along[which]))
 
-    return _integrate_adaptively(integrand, left, width, tolerance)
+    rounding = force_rounding(surface, starts) * float(lengths.max())
+    return _integrate_adaptively(integrand, left, width, tolerance, rounding)
+
+
+def force_rounding(surface: Surface, points: FloatArray) -> float:
+    """Return about the greatest rounding error of a force in the box of points (n, 3) [N].
+
+    The depth is a difference of heights, and heights and slopes are those of a rounded place.
+    """
+    slope, hessian = surface.texture.bounds
+    place = float(np.abs(points).max())
+    height = max(map(abs, surface.texture.extremes))
+    rise = 1.0 + slope + hessian * surface.max_depth
+    return _FORCE_ROUNDING * surface.stiffness * (height + rise * place)
 
 
 def _check_panel_count(panels: float, surface: Surface, path_length: float, wave: float) -> None:
@@ -339,11 +354,15 @@ def _segment_work(
         points = segment.start + s[:, None] * along
         return surface.force(points, deflection=segment.deflection(s)) @ along
 
-    return integrate(integrand, _panel_count(length, wave, 1), tolerance)
+    rounding = force_rounding(surface, np.stack([segment.start, segment.end])) * length
+    return integrate(integrand, _panel_count(length, wave, 1), tolerance, rounding)
 
 
 def integrate(
-    integrand: Callable[[FloatArray], FloatArray], panels: int, tolerance: float = DEFAULT_TOLERANCE
+    integrand: Callable[[FloatArray], FloatArray],
+    panels: int,
+    tolerance: float = DEFAULT_TOLERANCE,
+    rounding: float = 0.0,
 ) -> float:
     """Return the integral over [0, 1] of a function with kinks and jumps at unknown places.
 
@@ -352,10 +371,14 @@ def integrate(
         panels: initial number of equal panels.
         tolerance: panels are halved until two nested rules agree to this part of the integral of
             the absolute value.
+        rounding: error of the integrand, below which none is lowered.
+
+    Raises:
+        TooSteepError: if panels become ever more.
     """
-    return _integrate_adaptively(
-        integrand, np.arange(panels) / panels, np.full(panels, 1.0 / panels), tolerance
-    )
+    left = np.arange(panels) / panels
+    width = np.full(panels, 1.0 / panels)
+    return _integrate_adaptively(integrand, left, width, tolerance, rounding)
 
 
 def _integrate_adaptively(
@@ -363,8 +386,9 @@ def _integrate_adaptively(
     left: FloatArray,
     width: FloatArray,
     tolerance: float,
+    rounding: float,
 ) -> float:
-    """Return the integral over panels, halved until two nested rules agree."""
+    """Return the integral over panels, halved until two nested rules agree; see integrate()."""
     total = 0.0
     scale = 0.0
     for level in range(_MAX_REFINEMENTS):
@@ -375,12 +399,15 @@ def _integrate_adaptively(
         fine = width * (values @ _FINE_WEIGHTS)
         error = np.abs(fine - width * (values[:, ::2] @ _COARSE_WEIGHTS))
         scale = max(scale, float((width * (np.abs(values) @ _FINE_WEIGHTS)).sum()))
-        refine = error > tolerance * scale
+        refine = error > max(tolerance * scale, rounding)
         if level == _MAX_REFINEMENTS - 1:
             refine[:] = False
         total += float(fine[~refine].sum())
         if not refine.any():
             break
+        if np.count_nonzero(refine) > _MAX_TOTAL_PANELS:
+            reason = "cannot be reached: the force is too rough, or rounding is greater"
+            raise TooSteepError("tolerance", reason, tolerance)
         half = 0.5 * width[refine]
         left = np.concatenate([left[refine], left[refine] + half])
         width = np.concatenate([half, half])

@@ -19,6 +19,7 @@ from asperity.analysis.energy.absorbing_friction import (
 from asperity.analysis.energy.closed_loops import AbsorbingFriction, Leak, LoopKind, LoopOrigin
 from asperity.analysis.energy.field_energy import (
     TooSteepError,
+    force_rounding,
     initial_panels,
     integrate,
     loop_work,
@@ -226,7 +227,9 @@ def _mean_thrust(surface: Surface, line: ScanLine) -> float:
         # For costly contacts: equal steps suffice for a periodic mean.
         steps = (np.arange(_THRUST_STEPS) + 0.5) / _THRUST_STEPS
         return float(integrand(steps).mean())
-    return integrate(integrand, initial_panels(surface, line.length))
+    ends = np.array([[*line.start, height], [*(line.start + line.length * line.direction), height]])
+    rounding = force_rounding(surface, ends)
+    return integrate(integrand, initial_panels(surface, line.length), rounding=rounding)
 
 
 # --- loops of laws with state, from the onset of contact, where the anchor is created ------------
