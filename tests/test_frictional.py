@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bench.stress import friction as friction_stress
 
+from asperity.analysis.energy.straight_scan import friction_scan
 from asperity.core.errors import ParameterError
 from asperity.frictional import accepts_friction
 from asperity.laws import LAWS, Law
@@ -104,6 +105,27 @@ def test_jacobian_equals_differences_of_the_force(law: str) -> None:
     alone = surface.without_friction().jacobian(points)
     np.testing.assert_array_equal(surface.jacobian(points), alone)
     np.testing.assert_allclose(surface.jacobian(points, zero) - alone, -kappa * PLANE, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", "WCD")
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_friction_is_the_same_in_other_units(law: str, unit: float) -> None:
+    """Lengths of a kilometre: the anchor slips after hundreds of metres."""
+    texture = Sinusoid(0.12 * unit, unit, phase=0.4, direction=(1.0, 0.3))
+    surface = Surface(texture, law, 1.0, 0.15 * unit, friction=MU, friction_modulation=A)
+    points = unit * np.array([[0.2, 0.1, -0.2], [-0.7, 0.4, -0.15], [0.45, -0.9, -0.25]])
+    deflection = 9.0 * unit * np.array([[0.6, 0.8], [1.0, 0.0], [-0.8, 0.6]])
+    one = Sinusoid(0.12, 1.0, phase=0.4, direction=(1.0, 0.3))
+    metre = Surface(one, law, 1.0, 0.15, friction=MU, friction_modulation=A)
+    flags = np.ones(3, bool)
+    expected = metre.jacobian(points / unit, deflection / unit, flags)
+    np.testing.assert_allclose(surface.jacobian(points, deflection, flags), expected, atol=1e-9)
+    scan = friction_scan(surface)
+    expected_scan = friction_scan(metre)
+    assert scan is not None
+    assert expected_scan is not None
+    assert scan.remaining == pytest.approx(expected_scan.remaining, rel=1e-6)
+    assert scan.mean / unit == pytest.approx(expected_scan.mean, rel=1e-6)
 
 
 PLANE = np.tile(np.diag([1.0, 1.0, 0.0]), (60, 1, 1))

@@ -30,7 +30,7 @@ from asperity.laws.friction import (
 )
 from asperity.textures.texture import Texture
 
-# Height above the texture [m] at which there is no contact, and a deflection beyond any limit.
+# Height above the texture [m] at which there is no contact.
 _CLEARANCE = 1.0
 
 
@@ -71,6 +71,7 @@ class Frictional(Plottable, ABC):
     texture: Texture
     law: Law
     stiffness: float
+    max_depth: float
     law_parameters: Mapping[str, float]
     _explicit_parameters: Mapping[str, float]
 
@@ -185,8 +186,21 @@ class Frictional(Plottable, ABC):
             return np.array([self.trace(path)[1] for path in paths]).reshape(-1, 3)
         path = np.repeat(rows, 2, axis=0)
         path[::2, :2] -= deflections
-        path[::2, 2] = self.texture.extremes[1] + _CLEARANCE
+        path[::2, 2] = self.law.contact.extremes(self.texture)[1] + _CLEARANCE
         return self.trace(path)[1::2]
+
+    def deflection_beyond_limit(self, points: FloatArray) -> float:
+        """Return a deflection [m] at which an anchor slides at all of points (n, 3).
+
+        It is greater than μ k D/κ, with the greatest depth D that any contact may have there.
+        """
+        friction = self.contact_friction
+        if friction is None:
+            return 0.0
+        top = self.law.contact.extremes(self.texture)[1]
+        depth = max(top - float(points[:, 2].min()), 0.0)
+        limit = friction.coefficient * self.stiffness * depth / friction.presliding_stiffness
+        return 2.0 * limit + self.max_depth
 
     def _with_friction(
         self,
@@ -218,7 +232,7 @@ class Frictional(Plottable, ABC):
         plain = self._replace(
             _explicit_parameters={**self._explicit_parameters, "friction_modulation": 0.0}
         )
-        shift = np.tile([_CLEARANCE, 0.0], (len(rows), 1))
+        shift = np.tile([self.deflection_beyond_limit(rows), 0.0], (len(rows), 1))
         normal = (force - plain._deflected_force(rows, shift))[:, 0] / friction.coefficient
         contact = normal > 0.0
         slope = np.zeros_like(force)

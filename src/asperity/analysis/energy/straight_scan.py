@@ -156,6 +156,7 @@ def friction_scan(surface: Surface) -> FrictionScan | None:
     path[:, :2] = line.start + way[:, None] * line.direction
     law = surface.force(path)
     beyond = np.tile(along[: surface.contact_friction.axes], (len(way), 1))
+    beyond *= surface.deflection_beyond_limit(path)
     forces = law - surface.trace(path), law - surface.force(path, beyond)
     rendered, limit = (force[_SCAN_POINTS_PER_LINE:] @ along for force in forces)
     ripple = float(rendered.std())
