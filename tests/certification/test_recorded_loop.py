@@ -10,7 +10,11 @@ import pytest
 from asperity import ParameterError
 from asperity.certification.recorded_loop import RecordedSamples, certify_recording, read_samples
 from asperity.core.checks import FloatArray
+from asperity.recording.recording import open_recording
 from asperity.recording.writer import RecordingWriter
+from asperity.report.pages.run_report import recording_facts
+from asperity.report.sentences.certification_sentences import recording_answer
+from asperity.report.sentences.texts import energy_text
 
 PERIOD = 1e-3
 
@@ -102,6 +106,35 @@ def test_table_with_units_equals_a_recording(tmp_path: Path) -> None:
     second = read_samples(recording)
     assert first.positions == pytest.approx(second.positions, abs=1e-15)
     assert first.forces == pytest.approx(second.forces)
+
+
+@pytest.mark.parametrize("step", [55e-6, 0.0])
+def test_energy_along_exact_positions_is_named_beside_the_one_in_encoder_steps(
+    tmp_path: Path, step: float
+) -> None:
+    samples = make_samples(-1e-3 + 1e-4 * np.sin(0.1 * np.arange(100)))
+    heights = samples.positions[:, 2]
+    rounded = step * np.round(heights / step) if step else heights
+    work = np.concatenate([[0.0], np.cumsum(samples.forces[:-1, 2] * np.diff(rounded))])
+    columns = (("time", "s"), *[(axis, "m") for axis in "xyz"])
+    columns += tuple((f"applied {axis}", "N") for axis in "xyz")
+    path = tmp_path / "run.mcap"
+    metadata = {"servo": {"position_resolution": step}}
+    with RecordingWriter(path, (*columns, ("supplied", "J")), metadata) as writer:
+        writer.append(np.column_stack([samples.times, samples.positions, samples.forces, work]))
+    result = certify_recording(read_samples(path))
+    answer = recording_answer(result)
+    facts = dict(recording_facts(open_recording(path)))
+    if step:
+        assert result.measured_energy == pytest.approx(work[-1])
+        assert abs(work[-1] - result.energy) > 0.1 * abs(work[-1])
+        measured = f"Energy to the hand: {energy_text(work[-1])}, as measured in encoder steps of"
+        assert f"along the exact positions of the simulation. {measured} 55 µm." in answer
+        assert facts["Supplied"] == "energy to the hand, as measured in encoder steps of 55 µm"
+    else:
+        assert result.measured_energy is None
+        assert "encoder" not in answer
+        assert "Supplied" not in facts
 
 
 @pytest.mark.parametrize(

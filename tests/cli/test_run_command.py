@@ -123,6 +123,7 @@ def test_surface_without_a_scene_uses_the_recommended_stiffness(call: Call, tmp_
     device = override_device(asp.load_device("touch"), {"update_rate": "500 Hz"})
     row = asp.compare(wave, device, laws="D", clamp="backed").rows[0]
     stiffness = row.recommended_stiffness
+    assert "as measured in encoder steps of 55 µm" in " ".join(out.split())
     text = " ".join(out.split())
     assert f"Law D at {format_quantity(stiffness, 'N/m')}, as compare recommends" in text
     assert "A simulated hand is pulled 160 µm deep" in text

@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from asperity.core.files import Serializable, open_input
 from asperity.core.units import parse_quantity
 from asperity.recording.recorded_field import LimitCounts
 from asperity.recording.recording import is_recording, open_recording
-from asperity.recording.replay import recorded_limits
+from asperity.recording.replay import recorded_limits, rounded_step
 
 MAX_LAG = 3
 _MAX_BYTES = 2**31
@@ -48,6 +47,7 @@ class RecordedSamples:
         limits: samples at the force limit and below ``max_depth``; ``None`` where these are not
             known.
         position_resolution: step to which the loop rounded positions that are recorded exactly [m].
+        measured_energy: work on the hand that the loop measured in such steps [J], or ``None``.
     """
 
     name: str
@@ -56,6 +56,7 @@ class RecordedSamples:
     forces: FloatArray
     limits: LimitCounts | None = None
     position_resolution: float = 0.0
+    measured_energy: float | None = None
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,8 @@ class RecordedCertification(Serializable):
         energy: held-force work on the hand [J].
         trapezoidal_energy: trapezoidal work on the hand [J].
         axis_energies: held-force work along each axis [J].
+        measured_energy: held-force work that the loop measured along positions that it rounded [J];
+            ``None`` for a loop that rounded none.
         violated_since: first time at which more energy had been given than taken, for good or not
             [s]; ``None`` if never.
         violation: greatest energy given in all up to some time [J].
@@ -117,6 +120,7 @@ class RecordedCertification(Serializable):
     energy: float
     trapezoidal_energy: float
     axis_energies: tuple[float, ...]
+    measured_energy: float | None
     violated_since: float | None
     violation: float
     violated_at: tuple[float, ...] | None
@@ -142,15 +146,19 @@ def read_samples(path: str | Path) -> RecordedSamples:
     place = Path(path)
     limits = None
     resolution = 0.0
+    measured_energy = None
     if is_recording(place):
         recording = open_recording(place)
         names = recording.names
         force = "applied" if "applied x" in names else "commanded"
         columns = ["time", *_AXES, *[f"{force} {axis}" for axis in _AXES]]
         limits = recorded_limits(recording)
-        with suppress(KeyError, TypeError, ValueError):
-            resolution = float(recording.metadata["servo"]["position_resolution"])
-        table = recording.table()[:, [names.index(column) for column in columns if column in names]]
+        resolution = rounded_step(recording)
+        rows = recording.table()
+        table = rows[:, [names.index(column) for column in columns if column in names]]
+        if resolution and "supplied" in names and len(rows):
+            supplied = names.index("supplied")
+            measured_energy = float(rows[-1, supplied] - rows[0, supplied])
         if table.shape[1] != len(columns):
             raise ParameterError("recording", f"{place} lacks one of the columns {columns}")
     else:
@@ -163,7 +171,10 @@ def read_samples(path: str | Path) -> RecordedSamples:
     if len(times) < 16:
         raise ParameterError("recording", f"{place} has {len(times)} rows; 16 are needed")
     positions = table[:, 1:4]
-    return RecordedSamples(place.name, times, positions, table[:, 4:7], limits, resolution)
+    forces = table[:, 4:7]
+    return RecordedSamples(
+        place.name, times, positions, forces, limits, resolution, measured_energy
+    )
 
 
 def _read_csv(path: Path) -> FloatArray:
@@ -238,6 +249,7 @@ def certify_recording(samples: RecordedSamples) -> RecordedCertification:
         energy=float(total[-1]),
         trapezoidal_energy=float(middle.sum()),
         axis_energies=tuple(energy_trace[-1].tolist()),
+        measured_energy=samples.measured_energy,
         violated_since=since,
         violation=max(float(total[greatest]), 0.0),
         violated_at=place,

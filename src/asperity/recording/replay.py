@@ -136,6 +136,17 @@ def replay(recording: Recording | str | os.PathLike[str], surface: Surface | Non
     return result
 
 
+def rounded_step(recording: Recording) -> float:
+    """Return the step [m] to which a loop rounded positions that it recorded exactly; 0 for none.
+
+    The column ``supplied`` is the work along the rounded positions.
+    """
+    try:
+        return float(recording.metadata["servo"]["position_resolution"])
+    except (KeyError, TypeError, ValueError):
+        return 0.0
+
+
 @lru_cache(maxsize=1)  # the page and the data of one recording state it
 def recorded_limits(recording: Recording) -> LimitCounts | None:
     """Return how many rows of a recording are at the force limit and below ``max_depth``.

@@ -11,7 +11,7 @@ from asperity.core.files import json_text, text_digest, write_bytes
 from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
 from asperity.recording.recording import Recording
-from asperity.recording.replay import Replay
+from asperity.recording.replay import Replay, rounded_step
 from asperity.report.document.html import render_page
 from asperity.report.document.page import (
     PAPER_CITATION,
@@ -37,6 +37,7 @@ from asperity.report.sentences.loop_text import (
     calibration_lines,
     closure_text,
     limited_lines,
+    measured_energy_text,
     rate_lines,
     recording_answer,
     replay_answer,
@@ -187,6 +188,10 @@ def recording_facts(recording: Recording) -> list[tuple[str, str]]:
     period = row_period(about)
     if period:
         rows += [("From row to row", format_quantity(period, "s"))]
+    step = rounded_step(recording)
+    if step and "supplied" in recording.names:
+        steps = format_quantity(step, "m")
+        rows += [("Supplied", f"energy to the hand, as measured in encoder steps of {steps}")]
     return rows
 
 
@@ -309,6 +314,7 @@ def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: st
     rows = loop.rows(loop.memory.row_count - 1)[0]
     surface = setup.surface
     period = setup.servo.period
+    step = setup.servo.position_resolution
     device = setup.device.name
     if not loop.driver.has_moving_handle:
         device += f", {loop.driver.name}"
@@ -321,7 +327,7 @@ def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: st
         *timing_lines(statistics),
         *rate_lines(setup.device, period, statistics),
         *limited_lines(statistics, surface.max_depth),
-        *[f"Energy to the hand: {energy_text(float(row[11]))}" for row in rows[-1:]],
+        *[measured_energy_text(float(row[11]), step) for row in rows[-1:]],
         *[f"- {assumption}" for assumption in (*setup.assumptions, *loop.notes)],
     ]
     blocks = [Paragraph(line) for line in lines]

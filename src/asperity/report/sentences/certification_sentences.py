@@ -12,7 +12,7 @@ from asperity.certification.recorded_loop import RecordedCertification
 from asperity.certification.witnesses import BaselineDifference
 from asperity.core.units import format_quantity
 from asperity.devices import Device
-from asperity.report.sentences.loop_text import limit_texts
+from asperity.report.sentences.loop_text import limit_texts, measured_energy_text
 
 DIFFERENCE_UNITS = {"force": "N", "gain": "N/m", "leak": "J", "jump": "N"}
 
@@ -125,6 +125,10 @@ def recording_answer(result: RecordedCertification) -> str:
     direction = "gave the hand" if result.energy > 0.0 else "took from the hand"
     duration = format_quantity(result.duration, "s", digits=3)
     sentences = [f"{result.name}: the surface {direction} {energy} in {duration}."]
+    measured = result.measured_energy
+    if measured is not None and not math.isclose(measured, result.energy, rel_tol=1e-6):
+        text = measured_energy_text(measured, max(result.position_step))
+        sentences.append(f"This is along the exact positions of the simulation. {text}.")
     if result.violated_since is not None:
         most = format_quantity(result.violation, "J", digits=3)
         since = format_quantity(result.violated_since, "s", digits=3)

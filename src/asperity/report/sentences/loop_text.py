@@ -288,6 +288,14 @@ def status_line(loop: ServoProcess) -> str:
     return f"{time:8.2f} s  ({place}) mm  {force:6.3f} N  {energy_text(supplied):>10}  late {late}"
 
 
+def measured_energy_text(energy: float, step: float) -> str:
+    """Return the energy to the hand that a loop measured, and the step of its positions [m]."""
+    text = f"Energy to the hand: {energy_text(energy)}"
+    if step:
+        text += f", as measured in encoder steps of {format_quantity(step, 'm')}"
+    return text
+
+
 def timing_lines(statistics: LoopStatistics) -> list[str]:
     """Return late samples, start delay and period error of a loop.
 
