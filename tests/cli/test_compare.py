@@ -391,6 +391,19 @@ def test_after_not_felt_the_next_command_makes_it_felt(call: Call, options: list
     assert _next_commands(out) == [["envelope", "--device", "omega.3"]]
 
 
+def test_next_command_names_a_device_file_as_typed(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "my arm.toml"
+    path.write_text('max_stiffness = "1 N/mm"\n')
+    flat = "sinusoid:amplitude=1pm,period=1mm"
+    _code, out, _err = call("compare", flat, "--laws", "C", "--device", str(path))
+    assert _next_commands(out) == [["envelope", "--device", str(path)]]
+    scene = tmp_path / "scene.toml"
+    texture = '[texture]\nkind = "sinusoid"\namplitude = "1 pm"\nperiod = "1 mm"\n'
+    scene.write_text(f'{texture}[device]\nmax_stiffness = "1 N/mm"\n')
+    _code, out, _err = call("compare", str(scene), "--laws", "C")
+    assert _next_commands(out) == [["limits", str(scene)]]
+
+
 def test_reasons_are_shown_on_request_with_options(call: Call) -> None:
     """The answer is two sentences; options are named, not arguments of Python."""
     command = ["compare", "sinusoid:amplitude=0.4mm,period=2mm", "--laws", "C"]

@@ -165,13 +165,18 @@ def design_commands(surface: str, result: Design) -> str:
 def _remedy_command(surface: str, result: Comparison) -> str:
     """Return the command of the first change of the options that makes the texture felt.
 
-    Without such a change, and for a scene, which may magnify too: what the device renders.
+    Without such a change: what the device renders; for a scene, which may magnify too and have a
+    device of its own: what limits it.
     """
     row = result.nearest_row
     remedies = row.perceptibility.remedies if row is not None and row.perceptibility else ()
     values = {remedy.kind: remedy.value for remedy in reversed(remedies)}
-    if surface.endswith(".toml") or not {"magnify", "speed"} & set(values):
-        return shlex.join(["asperity", "envelope", "--device", result.device.id])
+    device = repeat_options({"device"})
+    if surface.endswith(".toml"):
+        return shlex.join(["asperity", "limits", surface, *device])
+    if not {"magnify", "speed"} & set(values):
+        device = device or ["--device", result.device.id]
+        return shlex.join(["asperity", "envelope", *device])
     ctx = click.get_current_context()
     changed = {"speed": format_quantity(values.get("speed", 0.0), "m/s")}
     if "magnify" in values:
