@@ -25,6 +25,31 @@ def test_height_map_is_written_and_read_back(call: Call, tmp_path: Path) -> None
     assert asp.load_texture(path).pitch == (5e-5, 5e-5)
 
 
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".x3p"])
+@pytest.mark.parametrize(
+    ("grid", "is_periodic"),
+    [
+        (("--spacing", "50um"), True),
+        (("--extent", "4mm,1mm", "--spacing", "50um"), True),
+        (("--spacing", "30um"), False),
+        (("--extent", "3mm"), False),
+    ],
+)
+def test_map_of_whole_periods_is_read_back_as_periodic(
+    call: Call, tmp_path: Path, suffix: str, grid: tuple[str, ...], is_periodic: bool
+) -> None:
+    path = tmp_path / f"map{suffix}"
+    _code, out, _err = call(WAVE, "-o", str(path), *grid)
+    assert ("it can be tiled" in out) == is_periodic
+    texture = asp.load_texture(path)
+    assert texture.domain.periodic == is_periodic
+    if is_periodic:
+        assert not any("levelled: " in step for step in texture.preparation)
+        places = [(0.1e-3, 0.0), (0.7e-3, 0.9e-3)]
+        expected = asp.Sinusoid(amplitude=1e-4, period=2e-3).height(places)
+        assert texture.height(places) == pytest.approx(expected, abs=2e-6)
+
+
 @pytest.mark.parametrize("convention", ["gltf", "chai3d"])
 def test_normal_map_reports_its_force_error(call: Call, tmp_path: Path, convention: str) -> None:
     path = str(tmp_path / "map.png")

@@ -38,7 +38,7 @@ class SampledMap:
         heights: [m], shape (ny, nx); row i lies i spacings along y from the first.
         normals: unit normals (x, y, z) along the axes of the grid, shape (ny, nx, 3).
         spacing: distance of the points along x and y [m].
-        is_periodic: whether the grid is one period, so that the map can be tiled.
+        is_periodic: whether the grid is whole periods, so that the map can be tiled.
         region: description of the region.
     """
 
@@ -63,6 +63,12 @@ class SampledMap:
         ny, nx = self.heights.shape
         steps = dict.fromkeys([format_quantity(step, "m") for step in self.spacing])
         return f"{self.region}, {nx} x {ny} points, {' x '.join(steps)} apart"
+
+    @property
+    def file_text(self) -> str:
+        """The text in a file; :func:`asperity.measured.reader.states_periodic` reads its end."""
+        periodic = "; periodic" if self.is_periodic else ""
+        return f"{_LAYOUT}; {self.description}; asperity {__version__}{periodic}"
 
 
 def sample_map(
@@ -105,7 +111,8 @@ def sample_map(
     ticks = [step * np.arange(count) for step, count in zip(steps, counts, strict=True)]
     points = domain.origin + np.stack(np.meshgrid(*ticks), axis=-1)
     region = " x ".join([format_quantity(side, "m") for side in size])
-    return _evaluate_map(texture, points, steps, np.array([1.0, 0.0]), False, region)
+    repeats = domain.repeats_after(counts[0] * steps[0], counts[1] * steps[1])
+    return _evaluate_map(texture, points, steps, np.array([1.0, 0.0]), repeats, region)
 
 
 def _point_count(side: float, step: float) -> int:
@@ -201,7 +208,7 @@ def height_png(surface_map: SampledMap) -> bytes:
     grey = np.rint((surface_map.heights - low) / (span / 65535.0)).astype(np.uint16)
     calibration = b"asperity\0" + struct.pack(">iiBB", 0, 65535, 0, 2)
     calibration += f"m\0{low!r}\0{span!r}".encode()
-    return _encode_png(surface_map, grey, b"pCAL", calibration, f"Heights; {_LAYOUT}")
+    return _encode_png(surface_map, grey, b"pCAL", calibration, "Heights")
 
 
 def height_tiff(surface_map: SampledMap) -> bytes:
@@ -210,7 +217,7 @@ def height_tiff(surface_map: SampledMap) -> bytes:
 
     stream = io.BytesIO()
     px, py = surface_map.spacing
-    metadata = {"unit": "um", "vunit": "um", "Info": f"Heights; {_LAYOUT}"}
+    metadata = {"unit": "um", "vunit": "um", "Info": f"Heights; {surface_map.file_text}"}
     heights = (1e6 * surface_map.heights).astype(np.float32)
     resolution = 1e-6 / px, 1e-6 / py
     tifffile.imwrite(stream, heights, imagej=True, metadata=metadata, resolution=resolution)
@@ -249,7 +256,7 @@ def normal_png(surface_map: SampledMap, convention: str = "gltf") -> bytes:
     """
     rule = find_convention(convention)
     pixels = rule.encode(surface_map.normals)
-    description = f"Normals, {rule.description}; {_LAYOUT}, green up"
+    description = f"Normals, {rule.description}; green up"
     return _encode_png(surface_map, pixels, b"", b"", description)
 
 
@@ -305,7 +312,7 @@ def _encode_png(
     from PIL import Image, PngImagePlugin
 
     text = PngImagePlugin.PngInfo()
-    description = f"{description}; {surface_map.description}; asperity {__version__}"
+    description = f"{description}; {surface_map.file_text}"
     text.add_text("Description", description.encode("latin-1", "replace").decode("latin-1"))
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, "png", pnginfo=text)
@@ -325,7 +332,7 @@ def _x3p_main_xml(surface_map: SampledMap, digest: str) -> bytes:
     (ny, nx) = surface_map.heights.shape
     (dx, dy) = surface_map.spacing
     values = {"nx": str(nx), "ny": str(ny), "dx": repr(dx), "dy": repr(dy)}
-    values |= {"version": __version__, "comment": surface_map.description}
+    values |= {"version": __version__, "comment": surface_map.file_text}
     declaration, *lines = load_template("x3p_main.xml").splitlines()
     text = f"{declaration}\n{''.join(map(str.strip, lines))}\n"
     return fill_template(text, values | {"checksum": digest.upper()}).encode()

@@ -214,10 +214,11 @@ def prepare(  # noqa: D417 - the others are described by their declarations
     cutoffs = find_cutoffs(raw.heights.shape, lateral, s_cutoff, l_cutoff)
     _check_arguments(raw.heights.shape, lateral, tip_radius, periodic, blend)
     require_memory(*raw.heights.shape[::-1])
+    periodic = bool(periodic) or (raw.is_periodic and borders_fit(raw.heights))
     start("outliers")
     heights = _scaled_heights(raw, lateral, height_range, outliers, max_missing, record, steps)
     start("form")
-    repeats = blend is None and _repeats(heights, bool(periodic), steps)
+    repeats = blend is None and _repeats(heights, periodic, steps)
     if repeats:  # a polynomial would break it
         form = 0
     sentence = subtract_form(heights, fit_form(heights, form), lateral)
@@ -242,7 +243,7 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         steps.append(sentence)
     start("magnify")
     ready = PreparedSurface(
-        heights, lateral, tuple(steps), some_or_none(filled), bool(periodic), tuple(record.stages)
+        heights, lateral, tuple(steps), some_or_none(filled), periodic, tuple(record.stages)
     )
     return magnify_surface(ready, magnify, magnify_height)
 

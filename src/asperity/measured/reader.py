@@ -49,6 +49,7 @@ class RawSurface:
             converts them to lengths.
         lacks_unit: whether relative heights are lengths, whose unit ``read_surface`` accepts.
         in_pitches: whether the heights are in units of the pitch, which is to be given.
+        is_periodic: whether the file states that the surface repeats; see :func:`states_periodic`.
 
     Example:
         >>> flat = RawSurface(np.zeros((4, 5)), (1e-6, 1e-6), "flat.npy", ())
@@ -64,11 +65,17 @@ class RawSurface:
     relative: bool = False
     lacks_unit: bool = False
     in_pitches: bool = False
+    is_periodic: bool = False
 
     @property
     def is_profile(self) -> bool:
         """Whether the surface is a profile h(x) rather than a map h(x, y)."""
         return self.heights.ndim == 1
+
+
+def states_periodic(text: str) -> bool:
+    """Return whether the text in a map of asperity states that the surface repeats."""
+    return text.rstrip().endswith("; periodic")
 
 
 def check_point_count(*counts: int) -> None:

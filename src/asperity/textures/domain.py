@@ -54,6 +54,11 @@ class Domain:
         spans = self.spans + 2.0 * margin * unit
         return replace(self, origin=self.origin - margin * unit.sum(axis=0), spans=spans)
 
+    def repeats_after(self, x: float, y: float) -> bool:
+        """Return whether the texture repeats after steps of x along x and of y along y [m]."""
+        periods = np.diag((x, y)) @ np.linalg.pinv(self.spans)
+        return self.periodic and bool(np.abs(periods - np.rint(periods)).max() < 1e-9)
+
     def orthogonal_spans(self) -> tuple[FloatArray, bool]:
         """Return orthogonal spans [m], and whether the texture is periodic along them."""
         if len(self.spans) == 1:

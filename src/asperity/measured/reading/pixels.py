@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import format_lengths, is_pitch, unit_to_metres
-from asperity.measured.reader import RawSurface, ReadingOptions, check_point_count
+from asperity.measured.reader import RawSurface, ReadingOptions, check_point_count, states_periodic
 from asperity.measured.reading.normal_map import decode_normals, normals_to_surface
 
 _MAX_DESCRIPTION = 10**6
@@ -34,6 +34,7 @@ class ImageScale:
         factor: see ``metres_per_value``.
         offset: see ``metres_per_value``.
         notes: the lengths found, one sentence each.
+        is_periodic: whether the file states that the surface repeats.
     """
 
     pitch: tuple[float, float] | None = None
@@ -41,6 +42,7 @@ class ImageScale:
     factor: float = 1.0
     offset: float = 0.0
     notes: tuple[str, ...] = ()
+    is_periodic: bool = False
 
 
 def imagej_scale(metadata: Mapping[str, Any], resolution: tuple[float, float] | None) -> ImageScale:
@@ -80,7 +82,8 @@ def imagej_scale(metadata: Mapping[str, Any], resolution: tuple[float, float] | 
         notes.append(f"unit of heights {metadata['vunit']!s:.20} from ImageJ's metadata")
     if (factor, offset) != (1.0, 0.0):
         notes.append(f"calibrated as ImageJ's metadata says: {offset:g} + {factor:g} value")
-    return ImageScale(pitch, unit, factor, offset, tuple(notes))
+    repeats = states_periodic(str(metadata.get("Info")))
+    return ImageScale(pitch, unit, factor, offset, tuple(notes), repeats)
 
 
 def ome_scale(description: str) -> ImageScale:
@@ -154,7 +157,8 @@ def png_scale(chunks: Mapping[bytes, bytes], depth: int) -> ImageScale:
         notes.append(f"pixel size {format_lengths(pitch)} from the chunk sCAL")
     if unit is not None:
         notes.append("heights calibrated as the chunk pCAL says")
-    return ImageScale(pitch, unit, factor, offset, tuple(notes))
+    repeats = states_periodic(chunks.get(b"tEXt", b"").decode("latin-1"))
+    return ImageScale(pitch, unit, factor, offset, tuple(notes), repeats)
 
 
 def _parse_scal(data: bytes) -> tuple[float, float] | None:
@@ -242,7 +246,8 @@ def pixels_to_surface(
     normals = decode_normals(values)
     if normals is not None:
         surface = normals_to_surface(normals, name, options.green)
-        return replace(surface, pitch=scale.pitch, notes=(*notes, *surface.notes))
+        notes = (*notes, *surface.notes)
+        return replace(surface, pitch=scale.pitch, notes=notes, is_periodic=scale.is_periodic)
     if options.green is not None:
         raise ParameterError("green", f"must not be given: {name} is no normal map", options.green)
     grey, notes = _to_grey(values, notes)
@@ -255,7 +260,7 @@ def pixels_to_surface(
             heights, scale.pitch, name, (*notes, note), has_units=False, relative=True
         )
     notes = (*notes, *assumed, "y runs down the image")
-    return RawSurface(unit * heights, scale.pitch, name, notes)
+    return RawSurface(unit * heights, scale.pitch, name, notes, is_periodic=scale.is_periodic)
 
 
 def _check_opaque(alpha: NDArray[Any]) -> None:

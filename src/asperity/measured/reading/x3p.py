@@ -22,6 +22,7 @@ from asperity.measured.reader import (
     SurfaceFile,
     check_point_count,
     measure_spacing,
+    states_periodic,
 )
 
 DTYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
@@ -64,7 +65,8 @@ def _read_archive(archive: _Archive, name: str) -> RawSurface:
     if header.is_profile:  # one row has no distance to the next
         return RawSurface(heights[0], (px,), name, tuple(notes))
     py = _find_step(header, header.axes[1], coordinates, along=0)
-    return RawSurface(heights, (px, py), name, tuple(notes))
+    repeats = states_periodic(_text(header.root, "Record2/Comment"))
+    return RawSurface(heights, (px, py), name, tuple(notes), is_periodic=repeats)
 
 
 # --- the archive --------------------------------------------------------------------------------
