@@ -56,6 +56,8 @@ def test_each_limit_is_one_row_that_starts_with_its_number(call: Call, width: in
     assert re.search(r"v / l < F₀ +100 Hz +400 Hz +yes", row(out, 6))
     assert "below 0.4 m/s" in row(out, 6)
     assert "Default speed 0.1 m/s" in out
+    heading = next(line for line in out.splitlines() if "condition" in line)
+    assert (" for " in heading) == ("share of the height variance" in out) == (width >= 96)
 
 
 def test_options_reach_the_result(call: Call, device_path: str) -> None:

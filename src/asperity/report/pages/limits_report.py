@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, Limit
 from asperity.analysis.results import check_limits
 from asperity.core.files import write_bytes
@@ -43,6 +45,7 @@ from asperity.report.sentences.limit_sentences import (
 )
 from asperity.report.sentences.surface_text import texture_name
 from asperity.report.sentences.texts import (
+    column_meanings,
     figure_text,
     glossary,
     readable_name,
@@ -85,7 +88,8 @@ def six_limits_table(result: check_limits.Limits) -> Table:
             _speeds_cell(limit),
         ]
         rows.append(Row(cells, style=_STYLES[limit.holds]))
-    return Table(_LIMIT_HEADINGS, rows, (3, 4, _SHARE_COLUMN), _LIMITS_LAYOUT)
+    layout = replace(_LIMITS_LAYOUT, legend={_SHARE_COLUMN: column_meanings("limits")[0]})
+    return Table(_LIMIT_HEADINGS, rows, (3, 4, _SHARE_COLUMN), layout)
 
 
 def _speeds_cell(limit: Limit) -> str:
@@ -130,6 +134,7 @@ def limits_page(result: check_limits.Limits) -> Page:
     fields = [*dict.fromkeys([limit.device_field for limit in result.limits]), "friction"]
     notes = [*symbol_lines(result), *table_notes("limits")]
     limits = [six_limits_table(result)]
+    terms = [*column_meanings("limits"), *glossary("limits")]
     surface = result.surface
     name = result.device.name
     return Page(
@@ -141,7 +146,7 @@ def limits_page(result: check_limits.Limits) -> Page:
             _figure_section(result),
             *_waves_sections(result),
             *assumption_sections(result.assumptions, device_numbers_table(result.device, fields)),
-            Section("How to read it", [DefinitionList(glossary("limits"))]),
+            Section("How to read it", [DefinitionList(terms)]),
         ],
         footer=f"{PAPER_CITATION}, section II.B. {NO_PERCEPTUAL_TEST}",
     )

@@ -36,7 +36,7 @@ def glossary(result: str) -> list[tuple[str, str]]:
 
 
 def column_meanings(table: str) -> list[tuple[str, str]]:
-    """Return headings and meanings of the columns of a table, "laws" or "cases"."""
+    """Return headings and meanings of the columns of a table, "laws", "limits" or "cases"."""
     return list(_load_texts()["columns"][table].items())
 
 
