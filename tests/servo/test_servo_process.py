@@ -20,7 +20,7 @@ from asperity.servo import loop_process
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.process import PrestartedProcess, ServoProcess
-from asperity.servo.safety import Safety
+from asperity.servo.safety import Safety, excess_stiffness_reason
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
@@ -75,6 +75,12 @@ def test_loop_renders_changes_surface_and_stops_without_force(loop: ServoProcess
     loop.stop()
     assert (loop.poll(), loop.process.is_alive()) == (EndReason.STOPPED, False)
     assert (applied_force(loop) == 0.0).all()
+
+
+def test_refused_stiffness_differs_from_the_limit_which_is_rounded_down() -> None:
+    steep = Surface(Sinusoid(0.2e-3, 2e-3), "C", stiffness=279.8)
+    reason = excess_stiffness_reason(steep, load_device("touch"))
+    assert reason.startswith("279.8 N/m is above the limit of 279 N/m for law C")
 
 
 def test_invalid_surface_change_does_not_disturb_the_loop(loop: ServoProcess) -> None:

@@ -12,7 +12,7 @@ from asperity.analysis.passivity.recommended_stiffness import recommend_stiffnes
 from asperity.core.arguments import read_arguments
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
-from asperity.core.units import format_quantity
+from asperity.core.units import format_quantity, round_down
 from asperity.devices import Device
 from asperity.simulation.servo import Servo
 from asperity.surface import Surface
@@ -162,7 +162,7 @@ def excess_stiffness_reason(surface: Surface, device: Device, *, keeps_margin: b
         return f"no stable stiffness is known {context}: analyze says what is missing"
     if surface.stiffness <= allowed:
         return ""
-    stiffness = format_quantity(surface.stiffness, "N/m")
-    limit += f" of {format_quantity(allowed, 'N/m', digits=3)}"
+    stiffness = format_quantity(surface.stiffness, "N/m", digits=6)
+    limit += f" of {format_quantity(round_down(allowed), 'N/m')}"
     reason = f"{recommended.stability_limit.basis}; q = {q.value:.3g}"
     return f"{stiffness} is above the {limit} {context} ({reason})"
