@@ -121,7 +121,7 @@ _HAND = {
     "stiffness": '["300 N/m", "300 N/m", "0 N/m"]',
     "damping": '"3 N*s/m"',
     "mass": '"50 g"',
-    "force": '["0 N", "0 N", "-0.3 N"]',
+    "force": '["0 N", "0 N", "-0.1 N"]',
 }
 _MOTION = {
     "start": '["-10 mm", "0 mm", "0 mm"]',
