@@ -1,4 +1,4 @@
-# Twelve tasks of the first day, as typed in an empty folder with asperity on the PATH.
+# Tasks of the first day, as typed in an empty folder with asperity on the PATH.
 # A test runs each task on its own, in at most two minutes: tests/cli/test_twelve_tasks.py.
 SURFACE=sinusoid:amplitude=0.2mm,period=2mm
 

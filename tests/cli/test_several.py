@@ -100,7 +100,7 @@ def test_device_without_max_stiffness_shows_a_hint(call: Call) -> None:
     assert (code, err) == (0, "")
     assert re.search(r"2diy +– +K₀ missing", out)
     text = " ".join(out.split())
-    assert 'add max_stiffness = "... N/m" to its file, or set max_stiffness=...N/m' in text
+    assert 'add max_stiffness = "... N/m" to its file, or give --set max_stiffness=...N/m' in text
     assert "2diy can be compared with --set max_stiffness=...N/m" in text
 
 

@@ -99,6 +99,7 @@ def test_a_plan_states_the_power(call: Call, file: str) -> None:
         ("remove nowhere P01", "folder is no folder of a study"),
         ("plan study.toml --effect -1", "effect"),
         ("plan study.toml --effect 2 --participants 2", "participants must be at least 3"),
+        ("plan study.toml --effect 1", "effect must differ from 1"),
         ("runn study.toml", "did you mean 'run'"),
     ],
 )

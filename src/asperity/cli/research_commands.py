@@ -268,6 +268,8 @@ def plan_command(file: str, effect: float, **values: Any) -> None:
     """
     from asperity.studies.study_report import plan_study
 
+    if effect == 1.0:
+        raise ParameterError("effect", "must differ from 1", effect)
     with output.progress_bar("simulating studies") as update:
         provided = options.provided_values(values, _PLAN)
         plan = plan_study(file, effect, progress=update, **provided)
