@@ -175,6 +175,9 @@ def test_two_columns_are_a_profile_or_a_matrix(tmp_path: Path) -> None:
     reverse = read_text(tmp_path, "x [m] z [m]\n4 5\n3 6\n2 7\n1 8\n")
     assert reverse.heights.tolist() == [8, 7, 6, 5]
     assert any("reversed" in note for note in reverse.notes)
+    twice = "".join(f"{k // 2} {k}\n" for k in range(20))
+    assert read_text(tmp_path, twice).heights.shape == (20, 2)
+    assert_refused(tmp_path, f"x [um] z [um]\n{twice}", "line 3: the positions .* must increase")
     many = [f"{k} 1" for k in range(9)] + ["7 1"] + [f"{k} 1" for k in range(10, 30)]
     assert_refused(tmp_path, "\n".join(many), "line 10: the positions .* must increase")
 

@@ -39,7 +39,7 @@ def read_text(file: reader.SurfaceFile, options: reader.ReadingOptions) -> reade
     if text_header.parse_map_header(table.comments).pitch is not None:
         raise SurfaceFileError("several maps in one file: save each in a file of its own")
     headings = text_header.find_headings(table)
-    is_list = header.pitch is None and _is_list(table)
+    is_list = header.pitch is None and _is_list(table, len(headings) == 2)
     heights = table.values
     if is_list:
         heights = heights[:, -1:]
@@ -78,13 +78,15 @@ def _check_table(table: TextTable) -> None:
         raise SurfaceFileError(f"line {line} has an infinite number")
 
 
-def _is_list(table: TextTable) -> bool:
+def _is_list(table: TextTable, has_two_headings: bool) -> bool:
     """Whether rows are points of a profile or of a map rather than rows of a matrix."""
     rows, columns = table.values.shape
-    return _is_monotonic(table) if columns == 2 else bool(columns == 3 and rows > 3)
+    if columns == 2:
+        return _is_monotonic(table, has_two_headings)
+    return bool(columns == 3 and rows > 3)
 
 
-def _is_monotonic(table: TextTable) -> bool:
+def _is_monotonic(table: TextTable, has_two_headings: bool) -> bool:
     """Whether two columns are a profile rather than a matrix; a damaged profile is refused."""
     positions = table.values[:, 0]
     steps = np.diff(positions)
@@ -93,7 +95,8 @@ def _is_monotonic(table: TextTable) -> bool:
     wrong = np.flatnonzero(~(steps * np.sign(rising) > 0))
     if len(wrong) == 0:
         return True
-    if len(wrong) > len(steps) // 10 and not np.isnan(positions).any():
+    is_damaged = has_two_headings or len(wrong) <= len(steps) // 10
+    if not is_damaged and not np.isnan(positions).any():
         return False
     fault = "the positions in the first of two columns must increase throughout"
     raise SurfaceFileError(f"line {table.line_numbers[int(wrong[0]) + 1]}: {fault}")
