@@ -11,6 +11,7 @@ from asperity import ParameterError
 from asperity.certification.recorded_loop import RecordedSamples, certify_recording, read_samples
 from asperity.core.checks import FloatArray
 from asperity.recording.recording import open_recording
+from asperity.recording.table_export import export_recording
 from asperity.recording.writer import RecordingWriter
 from asperity.report.pages.run_report import recording_facts
 from asperity.report.sentences.certification_sentences import recording_answer
@@ -92,6 +93,7 @@ def test_table_with_units_equals_a_recording(tmp_path: Path) -> None:
     samples = make_samples(-1e-3 + 1e-4 * np.sin(0.1 * np.arange(100)))
     rows = np.column_stack([samples.times, samples.positions, samples.forces])
     table = tmp_path / "run.csv"
+    exported = tmp_path / "exported.csv"
     lines = [
         ",".join(f"{value:.17g}" for value in row) for row in rows * [1e3, 1e3, 1e3, 1e3, 1, 1, 1]
     ]
@@ -104,6 +106,8 @@ def test_table_with_units_equals_a_recording(tmp_path: Path) -> None:
     writer.close()
     first = read_samples(table)
     second = read_samples(recording)
+    export_recording(open_recording(recording), exported)
+    assert read_samples(exported).forces == pytest.approx(second.forces)
     assert first.positions == pytest.approx(second.positions, abs=1e-15)
     assert first.forces == pytest.approx(second.forces)
 

@@ -203,9 +203,10 @@ def _read_csv(path: Path) -> FloatArray:
 
 def _find_column(path: Path, headings: list[str], name: str, unit: str) -> tuple[int, float]:
     """Return the position of a column and the SI value of its unit."""
+    names = {name, {"t": "time"}.get(name, f"applied {name[1:]}")}
     for index, heading in enumerate(headings):
         match = _HEADING.fullmatch(heading)
-        if match is not None and match[1].lower() in {name, "time" if name == "t" else name}:
+        if match is not None and match[1].lower() in names:
             return index, parse_quantity("recording", f"1 {match[2]}", unit)
     example = "t [s], x [m], y [m], z [m], fx [N], fy [N], fz [N]"
     raise ParameterError(
