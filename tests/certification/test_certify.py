@@ -258,6 +258,23 @@ def test_bad_arguments_are_refused(
         certify(source, **{"seconds": 0.2, "region": BOX, **arguments})
 
 
+@pytest.mark.parametrize("is_vectorized", [True, False])
+def test_error_of_a_function_is_reported_with_its_position(
+    tmp_path: Path, is_vectorized: bool
+) -> None:
+    path = tmp_path / "mine.py"
+    check = "" if is_vectorized else "    assert points.shape == (3,)\n"
+    path.write_text(
+        f"import numpy as np\ndef force(points):\n{check}"
+        "    if (points.T[0] > 0.9e-3).any():\n"
+        "        raise ValueError('out of range')\n"
+        "    return np.maximum(-points, 0.0) * [0.0, 0.0, 500.0]\n"
+    )
+    message = r"ValueError: out of range at the position \((1|0\.9\d+) mm"
+    with pytest.raises(ParameterError, match=message):
+        certify(f"{path}:force", region=((-1e-3, 1e-3),) * 3, seconds=1.0)
+
+
 def test_function_of_another_size_is_refused() -> None:
     with pytest.raises(ParameterError, match="returned 2 numbers for 1 points"):
         certify(lambda _point: [1.0, 2.0], region=BOX, seconds=0.2)

@@ -138,7 +138,10 @@ def _answer(renderer: LocalRenderer, method: str, points: FloatArray) -> FloatAr
     except RendererError as error:
         return error
     except Exception as error:  # of a user's function
-        return RendererError(f"raised {type(error).__name__}: {error}")
+        reason = f"raised {type(error).__name__}: {error}"
+        if method != "forces":
+            return RendererError(reason)
+        return crash_error(points.reshape(-1, 3)[int(renderer.progress[0])], reason)
     renderer.progress[0] += 1
     return answer
 

@@ -172,7 +172,16 @@ class FunctionRenderer(LocalRenderer):
         """Return forces along paths; see :class:`Renderer`."""
         if not self._takes_many:
             return super().forces(paths)
-        return _checked_forces(self._function(self.scale * paths.reshape(-1, 3)), paths)
+        points = self.scale * paths.reshape(-1, 3)
+        try:
+            forces = self._function(points)
+        except Exception as error:  # of a user's function: at which point?
+            for index in range(len(points)):
+                self.progress[0] = index
+                self._function(points[index : index + 1])
+            text = f"raised {type(error).__name__}: {error}; at {len(points)} points together only"
+            raise RendererError(text) from error
+        return _checked_forces(forces, paths)
 
     def reset(self) -> None:
         """Call the function's method ``reset``, if it has one."""
