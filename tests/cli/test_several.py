@@ -91,7 +91,7 @@ def test_html_page_has_every_case(call: Call) -> None:
     assert (code, err) == (0, "")
     for words in ("3D Systems Touch, 100 µm deep", "3D Systems Touch, 200 µm deep", "2diy"):
         assert words in page
-    assert "max_stiffness=...N/m" in page
+    assert "add max_stiffness = " in page
     assert len(page) < 3_000_000
 
 
@@ -100,8 +100,11 @@ def test_device_without_max_stiffness_shows_a_hint(call: Call) -> None:
     assert (code, err) == (0, "")
     assert re.search(r"2diy +– +K₀ missing", out)
     text = " ".join(out.split())
-    assert 'add max_stiffness = "... N/m" to its file, or give --set max_stiffness=...N/m' in text
+    assert 'measure it, and add max_stiffness = "... N/m" to its file' in text
     assert "2diy can be compared with --set max_stiffness=...N/m" in text
+    code, _out, err = call(SPEC, "--device", "2diy", "--laws", "W")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "to its file; 2diy can be compared with --set max_stiffness=...N/m" in err
 
 
 def test_error_when_no_device_has_max_stiffness(call: Call, tmp_path: Path) -> None:

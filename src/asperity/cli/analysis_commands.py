@@ -169,7 +169,9 @@ def _write_comparisons(
         page = report.comparisons_page(result, why)
         outputs.write(result, page, extra_line="\n".join([*remedies, why_hint(why)]))
     if not result.comparisons:
-        reasons = "; ".join(comparison.sentence for comparison in result.missing_data)
+        reasons = "; ".join(
+            [f"{one.sentence}; {_missing_data_text(one)}" for one in result.missing_data]
+        )
         raise ParameterError("device", f"lacks data to compare laws: {reasons}")
 
 

@@ -158,7 +158,7 @@ def missing_data_sentence(data: MissingData) -> str:
     """Return the data that a device lacks for a comparison, and how to supply them."""
     return (
         f"{data.device}: the stiffest smooth wall that held is unknown; measure it, and add "
-        f"{data.hint} to its file, or give --set {data.field}=...{data.unit}"
+        f"{data.hint} to its file"
     )
 
 
