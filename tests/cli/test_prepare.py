@@ -205,6 +205,23 @@ def test_interrupt_leaves_no_file(
     assert [p.name for p in tmp_path.iterdir()] == ["map.npy"]
 
 
+def test_file_that_appears_meanwhile_is_kept(
+    call: Call, source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "a.npz"
+    prepare = loading.prepare_file
+
+    def prepare_slowly(*arguments: Any, **keywords: Any) -> Any:
+        target.write_text("of another process")
+        return prepare(*arguments, **keywords)
+
+    monkeypatch.setattr(loading, "prepare_file", prepare_slowly)
+    code, out, err = call("prepare", source, "-o", str(target), "--pitch", "2um")
+    assert (code, out) == (2, "")
+    assert err == f"asperity: output exists: {target}; --force replaces it\n"
+    assert target.read_text() == "of another process"
+
+
 def test_prepared_file_can_only_be_magnified(call: Call, source: str, tmp_path: Path) -> None:
     first, second = str(tmp_path / "a.npz"), str(tmp_path / "b.npz")
     assert call("prepare", source, "-o", first, "--pitch", "2um", "--periodic")[0] == 0

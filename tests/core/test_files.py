@@ -21,6 +21,7 @@ from asperity.core.files import (
     OMITTED,
     Serializable,
     attributes_to_dict,
+    check_output,
     json_text,
     open_atomic,
     open_input,
@@ -171,6 +172,35 @@ def test_old_content_is_visible_until_all_is_written(tmp_path: Path) -> None:
         assert target.read_text() == "old"
     assert target.read_text() == "new"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def refuse_links(*_: object, **__: object) -> None:
+    raise PermissionError
+
+
+@pytest.mark.parametrize("has_links", [True, False])
+def test_file_that_appeared_after_the_check_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_links: bool
+) -> None:
+    if not has_links:
+        monkeypatch.delattr(os, "O_TMPFILE", raising=False)
+        monkeypatch.setattr(os, "link", refuse_links)
+    path = str(tmp_path / "a.txt")
+    check_output("json", path, force=False)
+    Path(path).write_text("of another process")
+    for _ in range(2):
+        with pytest.raises(ParameterError, match=f"^json exists: {path}; force=True replaces it$"):
+            write_bytes("json", path, b"mine")
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["of another process"]
+    check_output("json", path, force=True)
+    write_bytes("json", path, b"mine")
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["mine"]
+    for name in ("new", "newer"):
+        check_output("json", str(tmp_path / name), force=False)
+        write_bytes("json", tmp_path / name, b"first")
+        write_bytes("json", tmp_path / name, b"second")  # its own file
+        assert (tmp_path / name).read_text() == "second"
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the mode of a file is one of POSIX")

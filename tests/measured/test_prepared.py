@@ -165,8 +165,8 @@ def test_invalid_output_paths_are_refused(source: Path) -> None:
     for target, match in (
         (source, "must be another file than the surface"),
         (link, "must be another file than the surface"),
-        (source.parent / "missing" / "a.npz", "must lie in a folder that exists"),
-        (source.parent, "must be a file, not a folder"),
+        (source.parent / "missing" / "a.npz", "cannot be written: No such file"),
+        (source.parent, "cannot be written: Is a directory"),
     ):
         with pytest.raises(ParameterError, match=match) as caught:
             save_prepared(target, prepared, source)

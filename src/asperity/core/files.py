@@ -29,6 +29,9 @@ _MAX_DOTS = 10_000  # in a line of TOML
 
 STANDARD_OUTPUT = "-"
 
+# Absolute paths that were checked not to exist and are not written yet, with their arguments.
+_NEW_FILES: dict[str, str] = {}
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -96,7 +99,8 @@ def open_atomic(path: str | os.PathLike[str], *, durable: bool = False) -> Itera
     """Open a file for writing that replaces an existing file when the block ends without an error.
 
     The content is written to a temporary file in the same folder, which is then moved. For a
-    symbolic link the target is replaced. Devices and pipes are written to directly.
+    symbolic link the target is replaced. Devices and pipes are written to directly. A file that
+    appeared after :func:`check_not_existing` is kept.
 
     Args:
         path: the file to write.
@@ -107,25 +111,40 @@ def open_atomic(path: str | os.PathLike[str], *, durable: bool = False) -> Itera
 
     Raises:
         OSError: if the file cannot be written.
+        ParameterError: if it was checked not to exist, and does.
     """
     if is_special_file(path):
         with Path(path).open("wb") as stream:
             yield stream
         return
-    target = Path(os.path.realpath(path))
-    beside = target.with_name(f".{os.urandom(8).hex()}.tmp")
+    beside = Path(os.path.realpath(path)).with_name(f".{os.urandom(8).hex()}.tmp")
     try:
-        with _open_unnamed(target.parent) or beside.open("xb") as stream:
+        with _open_unnamed(beside.parent) or beside.open("xb") as stream:
             yield stream
             stream.flush()
             if durable:
                 os.fsync(stream.fileno())
             if stream.name != str(beside):
                 _link_unnamed(stream.fileno(), beside)
-        beside.replace(target)
+        _move_file(beside, path)
     except BaseException:  # also for an interrupt
         beside.unlink(missing_ok=True)
         raise
+
+
+def _move_file(source: Path, path: str | os.PathLike[str]) -> None:
+    """Move a file to a path; one that was checked not to exist is not replaced."""
+    key = os.path.abspath(path)
+    if key not in _NEW_FILES:
+        source.replace(os.path.realpath(path))
+        return
+    try:
+        os.link(source, key)
+        source.unlink()
+    except OSError:  # the path exists, or the file system has no links
+        check_not_existing(_NEW_FILES[key], path, force=False)
+        source.rename(key)
+    del _NEW_FILES[key]
 
 
 def _open_unnamed(folder: Path) -> IO[bytes] | None:
@@ -338,6 +357,8 @@ class Serializable:
 def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) -> None:
     """Check that a file does not exist, or may be replaced.
 
+    If it appears before this process has written it, it is not replaced either.
+
     Raises:
         ParameterError: if it exists and ``force`` is false.
     """
@@ -345,6 +366,9 @@ def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) 
         raise ParameterError(
             name, f"exists: {escape_unprintable(path)}; {{force}} replaces it", force=True
         )
+    _NEW_FILES.pop(os.path.abspath(path), None)
+    if not force:
+        _NEW_FILES[os.path.abspath(path)] = name
 
 
 def check_output(name: str, path: str | None, *, force: bool) -> None:

@@ -17,14 +17,7 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
-from asperity.core.files import (
-    Serializable,
-    check_output,
-    json_text,
-    open_input,
-    open_output,
-    to_plain_data,
-)
+from asperity.core.files import Serializable, json_text, open_input, open_output, to_plain_data
 from asperity.measured.form import HeightStatistics
 from asperity.measured.lengths import Pitch, is_pitch
 from asperity.measured.parameters import ParameterValues, compute_parameters, find_parameter
@@ -221,14 +214,9 @@ def save_prepared(path: FilePath, prepared: PreparedSurface, source: FilePath) -
 
 
 def check_output_path(path: Path, source: Path) -> None:
-    """Refuse a path that cannot be written, before any work is done.
-
-    Raises:
-        ParameterError: the path is the source itself; see also :func:`check_output`.
-    """
+    """Refuse a path that is the source itself, before any work is done."""
     if path.exists() and source.exists() and path.samefile(source):
         raise ParameterError("output", "must be another file than the surface", str(path))
-    check_output("output", str(path), force=True)
 
 
 def is_prepared(path: FilePath) -> bool:
