@@ -187,7 +187,13 @@ MODULES_BELOW_THE_ROOM = {
     "asperity.core.cache": {"os.fchmod", "os.geteuid", "os.getuid"},
     "asperity.core.files": {"/proc/", "os.O_TMPFILE"},
     "asperity.core.memory": {"/proc/", "/sys/"},
-    "asperity.core.processes": {"os.nice", "os.sched_getaffinity"},
+    "asperity.core.processes": {
+        "os.nice",
+        "os.sched_getaffinity",
+        "signal.pthread_sigmask",
+        "signal.SIG_BLOCK",
+        "signal.SIG_SETMASK",
+    },
     "asperity.__main__": {"platform.system"},
 }
 """What modules that cannot import the room ask, each after a check that it is there; and the name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -24,6 +25,42 @@ except KeyboardInterrupt:
     interrupted = 1
 print(interrupted, surface.force([[0.3e-3, 0.1e-3, -0.2e-3]])[0, 2])
 """
+
+START = {
+    "loop": "from asperity.servo.process import PrestartedProcess\n"
+    "parent = PrestartedProcess()\n"
+    "child = parent.process",
+    "renderer": "from asperity.certification.isolated import IsolatedRenderer\n"
+    "from asperity.certification.renderers import RendererSource\n"
+    "parent = IsolatedRenderer(RendererSource('pipe', 'cat'))\n"
+    "child = parent._process",
+    "worker": "from asperity.core.processes import make_pool\n"
+    "pool = make_pool(1)\n"
+    "pool.submit(abs, 1)\n"
+    "child, = pool._processes.values()",
+}
+INTERRUPT = """
+import os, signal, time
+try:
+    time.sleep({delay})
+    os.killpg(0, signal.SIGINT)
+    time.sleep(3600)
+except KeyboardInterrupt:
+    child.join(0.5)
+    print(child.is_alive(), signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+child.kill()
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes here")
+@pytest.mark.parametrize("delay", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("start", START)
+def test_child_process_takes_no_interrupt_while_it_starts(start: str, delay: float) -> None:
+    command = [sys.executable, "-c", START[start] + INTERRUPT.format(delay=delay)]
+    process = subprocess.run(
+        command, capture_output=True, text=True, check=False, start_new_session=True
+    )
+    assert (process.stdout, process.stderr) == ("True False\n", "")
 
 
 def test_interrupt_comes_after_the_block() -> None:

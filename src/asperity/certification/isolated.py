@@ -6,7 +6,6 @@ import mmap
 import os
 import tempfile
 import time
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -19,7 +18,7 @@ from asperity.certification.renderers import (
     crash_error,
 )
 from asperity.core.checks import FloatArray
-from asperity.core.processes import end_with_parent
+from asperity.core.processes import ShieldedContext, end_with_parent
 
 _START_TIMEOUT = 60.0
 _CALL_TIMEOUT = 10.0
@@ -36,7 +35,7 @@ class IsolatedRenderer:
     """
 
     def __init__(self, source: RendererSource) -> None:
-        context = get_context("spawn")
+        context = ShieldedContext()
         self._counter = tempfile.NamedTemporaryFile()  # noqa: SIM115  # closed with the process
         self._counter.write(bytes(8))
         self._counter.flush()

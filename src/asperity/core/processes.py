@@ -21,6 +21,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from enum import IntEnum
 from functools import partial
+from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -77,6 +78,30 @@ def limit_processes(count: int) -> Iterator[None]:
         _MAX_PROCESSES.reset(token)
 
 
+class ShieldedProcess(SpawnProcess):
+    """A process that Ctrl-C does not reach, from its first instruction: it inherits a mask."""
+
+    def start(self) -> None:
+        """Start the process."""
+        if not hasattr(signal, "pthread_sigmask"):
+            super().start()
+            return
+        from multiprocessing import resource_tracker
+
+        resource_tracker.ensure_running()  # starting it unblocks the signal
+        previous = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        try:
+            super().start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+
+
+class ShieldedContext(SpawnContext):
+    """Starts processes as :class:`ShieldedProcess`; the one that started them ends them."""
+
+    Process = ShieldedProcess
+
+
 def make_pool(
     workers: int, prepare: Callable[[], None] | None = None, niceness: int = 0
 ) -> ProcessPoolExecutor:
@@ -88,10 +113,9 @@ def make_pool(
         niceness: added to the niceness of the processes.
     """
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
 
     return ProcessPoolExecutor(
-        workers, get_context("spawn"), initializer=_start_worker, initargs=(prepare, niceness)
+        workers, ShieldedContext(), initializer=_start_worker, initargs=(prepare, niceness)
     )
 
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
 from multiprocessing.util import Finalize
 from typing import Any, Self
@@ -21,6 +20,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import to_plain_data
 from asperity.core.platform.process_control import resume_process
+from asperity.core.processes import ShieldedContext
 from asperity.devices import Device
 from asperity.loop.interface import NO_END
 from asperity.loop.shared_trace import COLUMNS
@@ -59,7 +59,7 @@ class PrestartedProcess:
     """
 
     def __init__(self, memory: LoopMemory | None = None) -> None:
-        context = SpawnContext()
+        context = ShieldedContext()
         self.memory = memory or LoopMemory()
         self.connection, theirs = context.Pipe()
         self.process = context.Process(
