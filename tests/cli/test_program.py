@@ -172,6 +172,23 @@ def test_interrupt_of_a_comparison_leaves_no_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL])
+def test_program_that_is_killed_with_workers_warns_of_nothing(
+    tmp_path: Path, end: signal.Signals
+) -> None:
+    plugin = tmp_path / "kill.py"
+    plugin.write_text(
+        "import os\n"
+        "from asperity.core.processes import make_pool\n"
+        "pool = make_pool(1)\n"
+        "pool.submit(abs, 1).result()\n"
+        f"os.kill(os.getpid(), {int(end)})\n"
+    )
+    command = [*PROGRAM, "compare", "cloth", "--plugin", str(plugin)]
+    process = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (process.returncode, process.stdout, process.stderr) == (-end, "", "")
+
+
 def test_control_characters_of_a_path_are_not_printed(tmp_path: Path) -> None:
     path = tmp_path / "a\x1b[31mred\x07\nline.x3p"
     path.write_bytes(b"no surface")
