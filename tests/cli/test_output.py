@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from asperity.cli.output import check_output, check_outputs, write_output
+from asperity.cli.output import Outputs, check_output, check_outputs, write_output
 from asperity.core.errors import ParameterError
+from asperity.report.document.page import Paragraph, terminal_page
 
 
 def test_existing_file_is_replaced_without_temporary_files(tmp_path: Path) -> None:
@@ -97,3 +98,13 @@ def test_existing_file_is_kept_without_force(tmp_path: Path) -> None:
 def test_name_that_is_too_long_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="json cannot be written: File name too long"):
         check_output("json", str(tmp_path / (300 * "x")), force=False)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
+def test_answer_is_printed_before_a_file_that_does_not_fit(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = terminal_page(Paragraph("the answer", "code"))
+    with pytest.raises(ParameterError, match="json cannot be written: No space left"):
+        Outputs(json="/dev/full").write({}, page, extra_line="what to do next")
+    assert capsys.readouterr().out.split("\n") == ["the answer", "what to do next", ""]

@@ -268,9 +268,9 @@ def envelope_command(
             progress=step,
             **options.provided_values(values, _CONDITIONS),
         )
+    outputs.write(result, envelope_page(result))
     for path in output:
         write_envelope(result, path)
-    outputs.write(result, envelope_page(result))
 
 
 _TARGET = (*options.command_arguments("design"), *_CONDITIONS[:4])

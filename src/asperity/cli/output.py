@@ -170,17 +170,30 @@ class Outputs:
     trace: str | None = None
     force: bool = False
 
-    def write(
-        self, data: Any, page: Page, page_label: str = "Report", extra_line: str = ""
-    ) -> None:
-        """Write a result to the output files, and print it unless standard output is one of them.
+    def write(self, data: Any, page: Page, extra_line: str = "") -> None:
+        """Print a result unless it is written to standard output, and write the output files.
 
         Args:
             data: the result for JSON, see :func:`asperity.core.files.to_plain_data`.
             page: the result for HTML and for the terminal.
-            page_label: label of the report in the terminal.
             extra_line: printed after the result, if any.
         """
+        from rich.console import Console
+
+        console = Console(highlight=False)
+        prints = STANDARD_OUTPUT not in {self.json, self.html, self.latex}
+        if prints:  # first, as the files may not fit on the disk
+            from asperity.report.document.terminal import print_page
+
+            print_page(page, console)
+            if extra_line:
+                console.print(extra_line, soft_wrap=True, markup=False)
+        self._write_files(data, page)
+        for label, path in (("Report", self.html), ("Trace", self.trace)):
+            if prints and path is not None:
+                console.print(f"{label}: {escape_unprintable(path)}", soft_wrap=True, markup=False)
+
+    def _write_files(self, data: Any, page: Page) -> None:
         if self.json is not None:
             write_output("json", self.json, json_text(data))
         if self.html is not None:
@@ -194,19 +207,6 @@ class Outputs:
             from asperity.report.document.latex import render_latex
 
             write_output("latex", self.latex, render_latex(page))
-        if STANDARD_OUTPUT in {self.json, self.html, self.latex}:
-            return
-        from rich.console import Console
-
-        from asperity.report.document.terminal import print_page
-
-        console = Console(highlight=False)
-        print_page(page, console)
-        if extra_line:
-            console.print(extra_line, soft_wrap=True, markup=False)
-        for label, path in ((page_label, self.html), ("Trace", self.trace)):
-            if path is not None:
-                console.print(f"{label}: {escape_unprintable(path)}", soft_wrap=True, markup=False)
 
 
 _OUTPUT_PATHS = ("json", "html", "latex", "trace")
