@@ -180,12 +180,14 @@ def test_invalid_output_paths_are_refused(call: Call, source: str, tmp_path: Pat
     for target, message in (
         (source, "output must be another file than the surface"),
         (str(tmp_path / "missing" / "a.npz"), "output must lie in a folder that exists"),
-        (str(tmp_path), "output must be a file, not a folder"),
+        (str(tmp_path), "output must be a file that ends in .npz"),
+        (str(tmp_path / "surface.x3p"), "output must be a file that ends in .npz, got "),
     ):
         code, _out, err = call("prepare", source, "-o", target, "--pitch", "2um")
         assert code == 2
         assert message in err
     assert Path(source).read_bytes() == before
+    assert list(tmp_path.iterdir()) == [Path(source)]
     code, _out, err = call("prepare", str(tmp_path / "none.x3p"), "-o", str(tmp_path / "a.npz"))
     assert (code, "no such file" in err) == (2, True)
     code, _out, err = call("prepare", source)

@@ -166,7 +166,8 @@ def test_invalid_output_paths_are_refused(source: Path) -> None:
         (source, "must be another file than the surface"),
         (link, "must be another file than the surface"),
         (source.parent / "missing" / "a.npz", "cannot be written: No such file"),
-        (source.parent, "cannot be written: Is a directory"),
+        (source.parent, "must be a file that ends in .npz"),
+        (source.parent / "surface.x3p", "must be a file that ends in .npz"),
     ):
         with pytest.raises(ParameterError, match=match) as caught:
             save_prepared(target, prepared, source)

@@ -190,7 +190,7 @@ def save_prepared(path: FilePath, prepared: PreparedSurface, source: FilePath) -
         source: the file that it was prepared from; its name and SHA-256 are saved.
 
     Raises:
-        ParameterError: the path is the source, its folder is missing, or it cannot be written.
+        ParameterError: the path does not end in .npz, is the source, or cannot be written.
     """
     check_output_path(Path(path), Path(source))
     filled = prepared.filled_mask
@@ -214,9 +214,11 @@ def save_prepared(path: FilePath, prepared: PreparedSurface, source: FilePath) -
 
 
 def check_output_path(path: Path, source: Path) -> None:
-    """Refuse a path that is the source itself, before any work is done."""
+    """Refuse a path that is not NPZ, or is the source itself, before any work is done."""
     if path.exists() and source.exists() and path.samefile(source):
         raise ParameterError("output", "must be another file than the surface", str(path))
+    if path.suffix.lower() != ".npz":
+        raise ParameterError("output", "must be a file that ends in .npz", str(path))
 
 
 def is_prepared(path: FilePath) -> bool:
