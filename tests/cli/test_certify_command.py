@@ -83,6 +83,9 @@ def test_baseline_tells_a_change(tmp_path: Path) -> None:
     code, text = run(leaking, *common, "--tolerance", "1N")
     assert code == 1
     assert "leak" in text
+    baseline.write_text("{")
+    _code, text = run(wall, *common)
+    assert "forces.json is no file of results: Expecting property name" in text
 
 
 def test_program_on_a_pipe_is_searched(tmp_path: Path) -> None:

@@ -261,6 +261,7 @@ BAD = {
     ("--precision", "half"): "precision must be one of double, float",
     ("--clamp", "soft"): "clamp must be one of none, whole, lateral, backed",
     ("-o", "wall.txt"): "output must be a file that ends in .h",
+    ("-o", "./"): "output must be a file that ends in .h, got '.'",
     ("-o", "no/such/folder/wall.h"): "output must lie in a folder that exists",
     ("--law", "Z"): "law",
     ("--max-data", "soft"): "max_data",

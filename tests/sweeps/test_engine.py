@@ -160,7 +160,7 @@ def test_folders_that_cannot_be_used(counting_plan: MakePlan, tmp_path: Path) ->
     with pytest.raises(ParameterError, match=r"holds another sweep \(other vary, cases\)"):
         open_store(counting_plan("texture.period=1mm:2mm:41log"), folder)
     other = replace(plan, template=replace(plan.template, package="1"))
-    with pytest.raises(ParameterError, match=r"holds another sweep \(other version_digest\)"):
+    with pytest.raises(ParameterError, match=r"holds another sweep \(other version of asperity\)"):
         open_store(other, folder)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "letter.txt").write_text("mine")

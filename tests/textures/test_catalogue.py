@@ -83,7 +83,7 @@ def test_scene_file_is_refused_as_a_texture(scene: Any) -> None:
         asp.Surface(scene)
 
 
-@pytest.mark.parametrize("texture", [None, 3.0, b"sandpaper", ["cloth"], asp.Surface(SINUSOID)])
+@pytest.mark.parametrize("texture", [None, 3.0, "", b"sandpaper", ["cloth"], asp.Surface(SINUSOID)])
 @pytest.mark.parametrize("function", [asp.Surface, asp.compare, asp.limits])
 def test_other_types_are_refused(function: Any, texture: Any) -> None:
     with pytest.raises(asp.ParameterError, match="texture must be a texture, a text such as"):

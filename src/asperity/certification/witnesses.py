@@ -164,7 +164,7 @@ def compare_baseline(
         forces = np.array(baseline["forces"], dtype=float).reshape(-1, 3)
         limits = {name: float(baseline[name]) for name in ("gain", "leak", "jump")}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ParameterError("baseline", f"{path} is none: {error}") from None
+        raise ParameterError("baseline", f"{path} is no file of results: {error}") from None
     now = calls.at(points)
     changes = np.abs(now - forces).max(axis=1)
     changed = np.flatnonzero(~(changes <= tolerance + result.resolution.force_error))

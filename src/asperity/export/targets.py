@@ -178,7 +178,7 @@ def check_name(path: Path, target: ExportTarget) -> None:
         requirement = "must be the name of a folder"
         if target.suffix:
             requirement = f"must be a file that ends in {target.suffix}"
-        raise ParameterError("output", requirement, escape_unprintable(path.name))
+        raise ParameterError("output", requirement, escape_unprintable(path.name or path))
 
 
 def write_files(

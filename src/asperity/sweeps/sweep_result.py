@@ -248,5 +248,6 @@ def check_plan(path: Path, plan: Mapping[str, Any], kind: str) -> None:
     expected = json.loads(text)
     differing = [name for name, value in expected.items() if recorded.get(name) != value]
     if differing:
-        requirement = f"holds another {kind} (other {', '.join(differing)}): choose another folder"
+        names = ", ".join(differing).replace("version_digest", "version of asperity")
+        requirement = f"holds another {kind} (other {names}): choose another folder"
         raise ParameterError("output", requirement, str(folder))

@@ -175,7 +175,7 @@ def as_texture(
     """
     if isinstance(texture, Texture):
         return texture
-    if not isinstance(texture, (str, os.PathLike)):
+    if not isinstance(texture, (str, os.PathLike)) or texture == "":
         requirement = "must be a texture, a text such as 'sandpaper:grit=P60', or a file's path"
         raise ParameterError(name, requirement, texture)
     extra = dict(values or {})
