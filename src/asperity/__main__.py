@@ -16,7 +16,7 @@ IO_ERROR = 74  # as in sysexits.h
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 _TRACEBACK = "ASPERITY_TRACEBACK"
 # The process that frees the semaphores of a program that was killed would warn of them.
-_NO_WARNING = {"PYTHONWARNINGS": "ignore:resource_tracker"}
+_NO_WARNING = "ignore:resource_tracker"
 _GARBAGE_THRESHOLD = 20_000  # objects: imports and compilers create many, of which few are garbage
 
 
@@ -57,7 +57,8 @@ def _prepare_streams() -> None:
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - likewise
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # both are text files
-    os.environ |= {"MPLBACKEND": "agg"} | SINGLE_THREADED | _NO_WARNING  # figures go to files
+    os.environ |= {"MPLBACKEND": "agg"} | SINGLE_THREADED  # figures go to files
+    os.environ.setdefault("PYTHONWARNINGS", _NO_WARNING)
 
 
 def _report_error(error: BaseException) -> int:

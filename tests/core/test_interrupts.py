@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -87,3 +88,32 @@ def test_interrupted_compiler_leaves_nothing_half_done(
     output = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
     assert output[0] == "1"
     assert float(output[1]) > 0.0
+
+
+PIPE = """
+import signal, subprocess, sys
+from asperity.core.processes import ShieldedContext, ignore_interrupts
+
+def start():
+    ignore_interrupts()
+    signal.raise_signal(signal.SIGINT)
+    program = "import signal; print(signal.pthread_sigmask(0, []) == set(), "
+    program += "signal.getsignal(2) is signal.default_int_handler)"
+    subprocess.run([sys.executable, "-c", program])
+
+if __name__ == "__main__":
+    child = ShieldedContext().Process(target=start)
+    child.start()
+    child.join()
+    print(child.exitcode)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no masks of signals here")
+def test_programs_of_a_child_process_take_interrupts(tmp_path: Path) -> None:
+    """Otherwise a program that hangs would outlive Ctrl-C."""
+    script = tmp_path / "parent.py"
+    script.write_text(PIPE, encoding="utf-8")
+    command = [sys.executable, str(script)]
+    process = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert process.stdout.split() == ["True", "True", "0"]

@@ -18,7 +18,7 @@ from asperity.certification.renderers import (
     crash_error,
 )
 from asperity.core.checks import FloatArray
-from asperity.core.processes import ShieldedContext, end_with_parent
+from asperity.core.processes import ShieldedContext, end_with_parent, ignore_interrupts
 
 _START_TIMEOUT = 60.0
 _CALL_TIMEOUT = 10.0
@@ -116,6 +116,7 @@ def _progress_array(path: str) -> Any:
 def _serve(source: RendererSource, counter: str, connection: Connection) -> None:
     """Answer requests until the connection is closed."""
     end_with_parent()
+    ignore_interrupts()
     try:
         renderer = source.load()
         renderer.progress = _progress_array(counter)

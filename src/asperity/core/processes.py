@@ -102,6 +102,13 @@ class ShieldedContext(SpawnContext):
     Process = ShieldedProcess
 
 
+def ignore_interrupts() -> None:
+    """Ignore Ctrl-C in this process from now on, but not in programs that it starts."""
+    signal.signal(signal.SIGINT, lambda _number, _frame: None)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_SETMASK, [])
+
+
 def make_pool(
     workers: int, prepare: Callable[[], None] | None = None, niceness: int = 0
 ) -> ProcessPoolExecutor:
