@@ -126,7 +126,7 @@ def test_html_page_is_complete_and_self_contained(tmp_path: Path):
     path = tmp_path / "surfaces.html"
     result = call("--html", str(path))
     assert result.exit_code == 0
-    assert "Figures:" in result.stdout
+    assert "Report:" in result.stdout
     assert [item.name for item in tmp_path.iterdir()] == ["surfaces.html"]
     page = path.read_text("utf-8")
     assert page.lower().startswith("<!doctype html>")

@@ -42,7 +42,7 @@ def surfaces_command(names: tuple[str, ...], outputs: Outputs) -> None:
 
     surfaces = find_surfaces(names)
     page = surfaces_page(surfaces, detailed=bool(names), command="asperity compare")
-    outputs.write({"schema": 2, "surfaces": surfaces}, page, "Figures")
+    outputs.write({"schema": 2, "surfaces": surfaces}, page)
 
 
 # What the progress bar shows for the stages of a preparation, in their order.

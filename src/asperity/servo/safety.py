@@ -148,7 +148,7 @@ def excess_stiffness_reason(surface: Surface, device: Device, *, keeps_margin: b
         >>> from asperity.textures.kinds.sinusoid import Sinusoid
         >>> steep = Surface(Sinusoid(amplitude=0.1e-3, period=2e-3), "C", stiffness=2000.0)
         >>> excess_stiffness_reason(steep, load_device("touch"))[:43]
-        '2000 N/m is above the limit of 364 N/m for '
+        '2000 N/m is above the limit of 363 N/m for '
     """
     q = characteristic_number(surface)
     recommended = recommend_stiffness(surface, device, q, one_sided_number(surface))
