@@ -189,14 +189,11 @@ class Frictional(Plottable, ABC):
         path[::2, 2] = self.law.contact.extremes(self.texture)[1] + _CLEARANCE
         return self.trace(path)[1::2]
 
-    def deflection_beyond_limit(self, points: FloatArray) -> float:
+    def deflection_beyond_limit(self, friction: Friction, points: FloatArray) -> float:
         """Return a deflection [m] at which an anchor slides at all of points (n, 3).
 
         It is greater than μ k D/κ, with the greatest depth D that any contact may have there.
         """
-        friction = self.contact_friction
-        if friction is None:
-            return 0.0
         top = self.law.contact.extremes(self.texture)[1]
         depth = max(top - float(points[:, 2].min()), 0.0)
         limit = friction.coefficient * self.stiffness * depth / friction.presliding_stiffness
@@ -232,7 +229,7 @@ class Frictional(Plottable, ABC):
         plain = self._replace(
             _explicit_parameters={**self._explicit_parameters, "friction_modulation": 0.0}
         )
-        shift = np.tile([self.deflection_beyond_limit(rows), 0.0], (len(rows), 1))
+        shift = np.tile([self.deflection_beyond_limit(friction, rows), 0.0], (len(rows), 1))
         normal = (force - plain._deflected_force(rows, shift))[:, 0] / friction.coefficient
         contact = normal > 0.0
         slope = np.zeros_like(force)

@@ -320,6 +320,9 @@ def info_command(file: str, outputs: Outputs) -> None:
     outputs.write(data, recording_page(recording, ranges))
 
 
+_output_option = partial(click.option, "-o", "--output", metavar="PATH", required=True)
+
+
 def _check_output(file: str, output: str, *, force: bool) -> None:
     """Check before a computation that a file can be written, and is not the recording."""
     if os.path.exists(output) and os.path.exists(file) and os.path.samefile(output, file):
@@ -330,13 +333,7 @@ def _check_output(file: str, output: str, *, force: bool) -> None:
 @recording_command.command("plot", short_help="Plot motion, force, energy and phase.")
 @click.argument("file")
 @plugin_option
-@click.option(
-    "-o",
-    "--output",
-    metavar="PATH",
-    required=True,
-    help="The file to write: a page (.html), or the figure alone (.svg, .png, .pdf).",
-)
+@_output_option(help="The file to write: a page (.html), or the figure alone (.svg, .png, .pdf).")
 @force_option
 def plot_command(file: str, output: str, *, force: bool) -> None:
     """Plot motion, force, energy and phase of the recording FILE."""
@@ -351,13 +348,7 @@ def plot_command(file: str, output: str, *, force: bool) -> None:
 
 @recording_command.command("export", short_help="Export a recording as CSV or MAT.")
 @click.argument("file")
-@click.option(
-    "-o",
-    "--output",
-    metavar="PATH",
-    required=True,
-    help="The file to write: .csv or .mat (MATLAB).",
-)
+@_output_option(help="The file to write: .csv or .mat (MATLAB).")
 @force_option
 def export_rows_command(file: str, output: str, *, force: bool) -> None:
     """Export the rows of the recording FILE with all digits as CSV or MAT."""

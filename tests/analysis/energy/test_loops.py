@@ -154,6 +154,18 @@ def test_work_along_grooves_is_zero_up_to_rounding(letter: str, shift: float) ->
     assert abs(loop_work(surface, path)) < 1e-12 * (1.0 + 1e3 * shift) * K * 0.2e-3 * 3e-3
 
 
+@pytest.mark.parametrize("height", [1e-5, 1e-7, 1e-9])
+def test_work_of_shallow_waves_scales_with_their_height(height: float) -> None:
+    """Law A pushes upwards alone, in proportion to heights; the path leaves and enters contact."""
+
+    def relative_work(size: float) -> float:
+        surface = Surface(Sinusoid(size, 1e-3, phase=0.3), "A", stiffness=K, max_depth=2.0 * size)
+        path = [[5e-5, 0.0, -0.3 * size], [3e-4, 2e-4, 1.4 * size], [7e-4, -1e-4, -0.8 * size]]
+        return loop_work(surface, path) / (K * size**2)
+
+    assert relative_work(height) == pytest.approx(relative_work(1e-3), rel=1e-12)
+
+
 @pytest.mark.parametrize("letter", "ABCG")
 def test_flat_map_has_no_leak_but_rounding(letter: str) -> None:
     surface = Surface(FLAT, letter, stiffness=K)

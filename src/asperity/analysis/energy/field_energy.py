@@ -289,20 +289,28 @@ def _field_work(
         points = starts[which] + (s - which)[:, None] * along[which]
         return np.asarray(np.einsum("ni,ni->n", surface.force(points), along[which]))
 
-    rounding = force_rounding(surface, starts) * float(lengths.max())
-    return _integrate_adaptively(integrand, left, width, tolerance, rounding)
+    return _integrate_adaptively(
+        integrand, left, width, tolerance, work_rounding(surface, starts, ends)
+    )
 
 
-def force_rounding(surface: Surface, points: FloatArray) -> float:
-    """Return about the greatest rounding error of a force in the box of points (n, 3) [N].
+def work_rounding(surface: Surface, starts: FloatArray, ends: FloatArray) -> float:
+    """Return about the greatest rounding error of the work along straight edges (n, 3) [J].
 
-    The depth is a difference of heights, and heights and slopes are those of a rounded place.
+    A depth is a difference of heights at a rounded place. A horizontal force is a depth times a
+    slope, in which heights cancel that are as close as samples.
     """
-    slope, hessian = surface.texture.bounds
-    place = float(np.abs(points).max())
-    height = max(map(abs, surface.texture.extremes))
-    rise = 1.0 + slope + hessian * surface.max_depth
-    return _FORCE_ROUNDING * surface.stiffness * (height + rise * place)
+    texture = surface.texture
+    slope, hessian = texture.bounds
+    place = np.abs(np.concatenate([starts, ends])).max(axis=0)
+    across = float(np.hypot(*place[:2]))
+    height = max(map(abs, texture.extremes)) + float(place[2])
+    sides = np.linalg.norm(texture.domain.spans, axis=1) / texture.sample_counts()
+    unit = _FORCE_ROUNDING * surface.stiffness
+    upward = unit * (height + slope * across)
+    sideways = slope * upward + unit * height * (hessian * across + slope + height / sides.min())
+    move = np.abs(ends - starts)
+    return float((upward * move[:, 2] + sideways * np.hypot(*move[:, :2].T)).max())
 
 
 def _check_panel_count(panels: float, surface: Surface, path_length: float, wave: float) -> None:
@@ -354,8 +362,12 @@ def _segment_work(
         points = segment.start + s[:, None] * along
         return surface.force(points, deflection=segment.deflection(s)) @ along
 
-    rounding = force_rounding(surface, np.stack([segment.start, segment.end])) * length
-    return integrate(integrand, _panel_count(length, wave, 1), tolerance, rounding)
+    return integrate(
+        integrand,
+        _panel_count(length, wave, 1),
+        tolerance,
+        work_rounding(surface, segment.start[None], segment.end[None]),
+    )
 
 
 def integrate(
@@ -376,9 +388,9 @@ def integrate(
     Raises:
         TooSteepError: if panels become ever more.
     """
-    left = np.arange(panels) / panels
-    width = np.full(panels, 1.0 / panels)
-    return _integrate_adaptively(integrand, left, width, tolerance, rounding)
+    return _integrate_adaptively(
+        integrand, np.arange(panels) / panels, np.full(panels, 1.0 / panels), tolerance, rounding
+    )
 
 
 def _integrate_adaptively(

@@ -19,11 +19,11 @@ from asperity.analysis.energy.absorbing_friction import (
 from asperity.analysis.energy.closed_loops import AbsorbingFriction, Leak, LoopKind, LoopOrigin
 from asperity.analysis.energy.field_energy import (
     TooSteepError,
-    force_rounding,
     initial_panels,
     integrate,
     loop_work,
     steady_work,
+    work_rounding,
 )
 from asperity.analysis.energy.straight_scan import (
     lines_across,
@@ -227,9 +227,12 @@ def _mean_thrust(surface: Surface, line: ScanLine) -> float:
         # For costly contacts: equal steps suffice for a periodic mean.
         steps = (np.arange(_THRUST_STEPS) + 0.5) / _THRUST_STEPS
         return float(integrand(steps).mean())
-    ends = np.array([[*line.start, height], [*(line.start + line.length * line.direction), height]])
-    rounding = force_rounding(surface, ends)
-    return integrate(integrand, initial_panels(surface, line.length), rounding=rounding)
+    start = np.array([[*line.start, height]])
+    return integrate(
+        integrand,
+        initial_panels(surface, line.length),
+        rounding=work_rounding(surface, start, start + line.length * tangent) / line.length,
+    )
 
 
 # --- loops of laws with state, from the onset of contact, where the anchor is created ------------

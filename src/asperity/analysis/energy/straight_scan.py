@@ -147,7 +147,8 @@ def friction_scan(surface: Surface) -> FrictionScan | None:
         >>> round(scan.mean, 3), round(scan.ripple, 4), round(scan.remaining, 2)
         (0.05, 0.0354, 1.0)
     """
-    if surface.contact_friction is None:
+    friction = surface.contact_friction
+    if friction is None:
         return None
     line = surface.texture.scan_line()
     along = np.append(line.direction, 0.0)
@@ -155,8 +156,8 @@ def friction_scan(surface: Surface) -> FrictionScan | None:
     path = np.full((len(way), 3), scan_height(surface))
     path[:, :2] = line.start + way[:, None] * line.direction
     law = surface.force(path)
-    beyond = np.tile(along[: surface.contact_friction.axes], (len(way), 1))
-    beyond *= surface.deflection_beyond_limit(path)
+    beyond = np.tile(along[: friction.axes], (len(way), 1))
+    beyond *= surface.deflection_beyond_limit(friction, path)
     forces = law - surface.trace(path), law - surface.force(path, beyond)
     rendered, limit = (force[_SCAN_POINTS_PER_LINE:] @ along for force in forces)
     ripple = float(rendered.std())
