@@ -170,7 +170,7 @@ _MAX_PANELS = 4096
 # Panels at once: some 200 MB, and seconds. A loop around a map of 2048 nodes has 35 000.
 _MAX_TOTAL_PANELS = 200_000
 # Rounding of a force, over that of the heights and places that it follows from.
-_FORCE_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+_FORCE_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 # From this number of edges on each edge is short.
 _MANY_EDGES = 64
 
@@ -302,15 +302,17 @@ def work_rounding(surface: Surface, starts: FloatArray, ends: FloatArray) -> flo
     """
     texture = surface.texture
     slope, hessian = texture.bounds
-    place = np.abs(np.concatenate([starts, ends])).max(axis=0)
-    across = float(np.hypot(*place[:2]))
-    height = max(map(abs, texture.extremes)) + float(place[2])
+    x, y, z = np.abs(np.concatenate([starts, ends])).max(axis=0).tolist()
+    across = math.hypot(x, y)
+    height = max(map(abs, texture.extremes)) + z
     sides = np.linalg.norm(texture.domain.spans, axis=1) / texture.sample_counts()
-    unit = _FORCE_ROUNDING * surface.stiffness
-    upward = unit * (height + slope * across)
-    sideways = slope * upward + unit * height * (hessian * across + slope + height / sides.min())
+    lowest = float(np.minimum(starts, ends)[:, 2].min())
+    depth = max(surface.law.contact.extremes(texture)[1] - lowest, 0.0)
+    upward = height + slope * across
+    sideways = slope * upward + depth * (hessian * across + slope + height / sides.min())
     move = np.abs(ends - starts)
-    return float((upward * move[:, 2] + sideways * np.hypot(*move[:, :2].T)).max())
+    lengths = upward * move[:, 2] + sideways * np.hypot(*move[:, :2].T)
+    return _FORCE_ROUNDING * surface.stiffness * float(lengths.max())
 
 
 def _check_panel_count(panels: float, surface: Surface, path_length: float, wave: float) -> None:
@@ -411,7 +413,7 @@ def _integrate_adaptively(
         fine = width * (values @ _FINE_WEIGHTS)
         error = np.abs(fine - width * (values[:, ::2] @ _COARSE_WEIGHTS))
         scale = max(scale, float((width * (np.abs(values) @ _FINE_WEIGHTS)).sum()))
-        refine = error > max(tolerance * scale, rounding)
+        refine = error > np.maximum(tolerance * scale, width * rounding)
         if level == _MAX_REFINEMENTS - 1:
             refine[:] = False
         total += float(fine[~refine].sum())
