@@ -80,7 +80,7 @@ async def reached(said: list[str], backdrop: BackgroundRenderer, version: int) -
 def test_another_process_follows_one_that_was_killed(setup: Setup) -> None:
     async def scenario(pictures: BackgroundWorker, limits: BackgroundWorker) -> None:
         said: list[str] = []
-        backdrop = BackgroundRenderer(pictures, limits, lambda: asyncio.sleep(0.0))
+        backdrop = BackgroundRenderer(pictures, limits, lambda: None)
         backdrop.show(setup.surface, setup.device)
         await reached(said, backdrop, 1)
         before = await backdrop.render(LOOK)
@@ -107,7 +107,7 @@ def test_another_process_follows_one_that_was_killed(setup: Setup) -> None:
 def test_a_surface_that_ends_each_process_is_given_up(setup: Setup) -> None:
     async def scenario(pictures: Deadly, limits: BackgroundWorker) -> None:
         pictures.deaths = 10
-        backdrop = BackgroundRenderer(pictures, limits, lambda: asyncio.sleep(0.0))
+        backdrop = BackgroundRenderer(pictures, limits, lambda: None)
         backdrop.show(setup.surface, setup.device)
         while "crashed each time" not in backdrop.message:
             await asyncio.sleep(0.01)
@@ -128,7 +128,7 @@ def test_a_surface_that_ends_each_process_is_given_up(setup: Setup) -> None:
 def test_another_device_has_another_limit_of_the_same_pictures(setup: Setup) -> None:
     async def scenario(pictures: BackgroundWorker, limits: BackgroundWorker) -> None:
         found = []
-        backdrop = BackgroundRenderer(pictures, limits, lambda: asyncio.sleep(0.0))
+        backdrop = BackgroundRenderer(pictures, limits, lambda: None)
         for name in ("touch-x", "omega.3", "omega.3", "touch-x"):
             backdrop.show(setup.surface, load_device(name))
             while not backdrop.limit:
@@ -189,12 +189,9 @@ class Counted(BackgroundWorker):
 def test_of_many_requests_only_the_newest_counts() -> None:
     async def scenario(crashes: int) -> tuple[list[int], dict[str, Any], int]:
         updates: list[int] = []
-
-        async def note() -> None:
-            updates.append(1)
-
         worker = Counted()
         worker.crashes = crashes
+        note = partial(updates.append, 1)
         result = BackgroundResult(worker, lambda number: {"square": number**2}, note)
         tasks = []
         for number in (1, 2, 3):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 import os
 import re
 import signal
@@ -10,20 +12,29 @@ import time
 from contextlib import suppress
 from http.client import HTTPConnection
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say, taken
 from tests.lab.started import Started
+from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 import asperity as asp
 from asperity.cli.main import cli
 from asperity.lab.access import MAX_MESSAGE_BYTES, page_files
-from asperity.lab.scene_state import DEFAULT_SURFACE, START_LAW, START_STIFFNESS, SceneState
-from asperity.lab.server import MAX_PENDING_FRAMES, MIN_FRAME_INTERVAL
+from asperity.lab.background import BackgroundWorker
+from asperity.lab.scene_state import (
+    DEFAULT_SURFACE,
+    START_LAW,
+    START_STIFFNESS,
+    SceneState,
+    make_scene_state,
+)
+from asperity.lab.server import MAX_PENDING_FRAMES, MIN_FRAME_INTERVAL, LabOptions, LabServer
+from asperity.scene import load_scene
 
 
 def got(lab: Started, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
@@ -123,6 +134,49 @@ def test_one_page_steers_and_others_watch(lab: Started) -> None:
             heard(second, news(has_control=True))
 
 
+class SlowConnection:
+    """A connection whose page receives nothing of a kind, and closes when it is let go."""
+
+    def __init__(self, blocked: str = "") -> None:
+        self.blocked = blocked
+        self.closed = asyncio.Event()
+        self.received: list[dict[str, Any]] = []
+
+    async def send(self, content: str) -> None:
+        message = json.loads(content)
+        if message["type"] == self.blocked:
+            await self.closed.wait()
+            raise ConnectionClosed(None, None)
+        self.received.append(message)
+
+    def __aiter__(self) -> SlowConnection:
+        return self
+
+    async def __anext__(self) -> str:
+        await self.closed.wait()
+        raise StopAsyncIteration
+
+
+def test_a_page_that_receives_nothing_delays_no_state_of_others() -> None:
+    async def scenario() -> list[bool]:
+        workers = [cast(BackgroundWorker, None)] * 3
+        lab = LabServer(make_scene_state(load_scene(DEFAULT_SURFACE)), workers, LabOptions())
+        stuck, open_page = SlowConnection("status"), SlowConnection()
+        tasks = []
+        for page in (stuck, open_page):
+            tasks.append(asyncio.create_task(lab.serve_client(cast(ServerConnection, page))))
+            await asyncio.sleep(0.05)
+        assert open_page.received[-1]["control_available"] is False
+        stuck.closed.set()
+        await asyncio.sleep(0.05)
+        open_page.closed.set()
+        await asyncio.gather(*tasks)
+        return [one["control_available"] for one in open_page.received if one["type"] == "status"]
+
+    # No state that is older follows a newer one.
+    assert asyncio.run(scenario()) == [False, True]
+
+
 @pytest.mark.parametrize(
     ("content", "code"),
     [
@@ -198,14 +252,18 @@ def test_pictures_come_again_when_their_process_was_killed(lab: Started) -> None
         for one in niced(lab):
             os.kill(one, signal.SIGKILL)
         say(page, "relief", **look)
-        told = heard(page, lambda m: news()(m) and m["picture_message"])
-        assert "has crashed and is restarted" in told["picture_message"]
-        assert (
-            heard(page, lambda m: isinstance(m, dict) and m["type"] == "picture_unavailable")[
-                "kind"
-            ]
-            == "relief"
-        )
+        notices: dict[str, str] = {}  # in either order
+
+        def note(message: Any) -> bool:
+            if news()(message) and message["picture_message"]:
+                notices["status"] = message["picture_message"]
+            elif isinstance(message, dict) and message["type"] == "picture_unavailable":
+                notices["unavailable"] = message["kind"]
+            return len(notices) == 2
+
+        heard(page, note)
+        assert "has crashed and is restarted" in notices["status"]
+        assert notices["unavailable"] == "relief"
         told = heard(
             page,
             lambda m: (

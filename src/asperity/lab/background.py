@@ -160,7 +160,7 @@ class BackgroundResult:
 
     worker: BackgroundWorker
     function: Callable[..., dict[str, Any]]
-    on_update: Callable[[], Coroutine[Any, Any, None]]
+    on_update: Callable[[], None]
     value: dict[str, Any] = field(default_factory=dict)
     _arguments: tuple[Any, ...] = ()
     _lock: asyncio.Lock = field(default_factory=asyncio.Lock)
@@ -187,7 +187,7 @@ class BackgroundResult:
                     break
         if arguments is self._arguments:
             self.value = value
-            await self.on_update()
+            self.on_update()
 
 
 def start_task(pending: set[asyncio.Task[None]], work: Coroutine[Any, Any, None]) -> None:
@@ -226,7 +226,7 @@ class BackgroundRenderer:
         self,
         picture_worker: BackgroundWorker,
         limit_worker: BackgroundWorker,
-        on_update: Callable[[], Coroutine[Any, Any, None]],
+        on_update: Callable[[], None],
         lane: str = "",
     ) -> None:
         self._lane = lane
@@ -278,17 +278,17 @@ class BackgroundRenderer:
             try:
                 await _run_in_worker(self._picture_worker, set_surface, surface, self._lane)
             except BrokenProcessPool:
-                await self._record_crash(surface)
+                self._record_crash(surface)
                 continue
             if surface is self._requested_surface:
                 self._ready_surface = surface
                 self.message = ""
                 self.version = self.version + 1
                 self.is_current = True
-                await self._on_update()
+                self._on_update()
             return
 
-    async def _record_crash(self, surface: Surface) -> None:
+    def _record_crash(self, surface: Surface) -> None:
         """Count a crash of the picture process, and report it."""
         self._ready_surface = None
         if surface is self._requested_surface:
@@ -297,7 +297,7 @@ class BackgroundRenderer:
             self._crash_times = [*recent, now]
             restarts = len(self._crash_times) < MAX_CRASHES
             self.message = _RESTART_TEXT if restarts else _NO_PICTURES_TEXT
-            await self._on_update()
+            self._on_update()
 
     async def render(self, request: ViewRequest) -> bytes:
         """Return a picture as a message; empty while no surface is ready."""
@@ -309,7 +309,7 @@ class BackgroundRenderer:
             arguments = request.kind, request.numbers
             view = await _run_in_worker(self._picture_worker, render_view, *arguments)
         if not view and surface is self._ready_surface:  # the crash was not yet recorded
-            await self._record_crash(surface)
+            self._record_crash(surface)
             start_task(self._tasks, self._prepare_pictures(surface))
         return view
 

@@ -85,6 +85,7 @@ class Client:
     Attributes:
         view_requests: requested pictures by kind; only the newest request of a kind counts.
         view_requested: set by a request.
+        state_changed: set by a change of the state.
         hand_moved: set by a motion of the hand.
         last_sent: number of the newest sent frame.
     """
@@ -93,6 +94,7 @@ class Client:
         self.connection = connection
         self.view_requests: dict[str, messages.ViewRequest] = {}
         self.view_requested = asyncio.Event()
+        self.state_changed = asyncio.Event()
         self.hand_moved = asyncio.Event()
         self.last_sent = self._last_acknowledged = 0.0
         self._acknowledgement = asyncio.Event()
@@ -179,7 +181,7 @@ class LabServer:
             if self.session.state in {"running", "stopped"}:
                 self._update_background()
             self.second_lane.update()
-            await self._broadcast_state()
+            self._broadcast_state()
 
     async def watch_steering(self) -> None:
         """Release the force of a real device when no page can do so, until cancelled."""
@@ -200,10 +202,10 @@ class LabServer:
         tasks: list[asyncio.Task[None]] = []
         try:
             await page.send("hello", **_greeting())
-            await self._broadcast_state()
+            self._broadcast_state()
             tasks = [
                 asyncio.create_task(_run_while_connected(work, page))
-                for work in (self._send_frames, self._send_pictures)
+                for work in (self._send_states, self._send_frames, self._send_pictures)
             ]
             await self._receive(page)
         except ConnectionClosed:
@@ -216,7 +218,7 @@ class LabServer:
                 self._controller = None
                 if self.session.handle is None:
                     self.session.end_tour()
-                await self._broadcast_state()
+                self._broadcast_state()
 
     async def _receive(self, client: Client) -> None:
         rate = RateLimit()
@@ -242,7 +244,7 @@ class LabServer:
             if self._controller is not None:
                 raise ParameterError("steering", "is done by a page: close that one first")
             self._controller = client
-            await self._broadcast_state()
+            self._broadcast_state()
         elif self._controller is not client:
             raise ParameterError("steering", "is done by another page: this one watches")
         else:
@@ -263,13 +265,24 @@ class LabServer:
         elif kind == "stop":
             self.session.release_force("the force was released")
 
-    async def _broadcast_state(self) -> None:
-        """Send the state to all pages."""
+    def _broadcast_state(self) -> None:
+        """Have the state sent to all pages."""
+        for page in self._clients:
+            page.state_changed.set()
+
+    async def _send_states(self, client: Client) -> None:
+        """Send the state after each change, as it is then: a slow page delays no other."""
+        while True:
+            await client.state_changed.wait()
+            client.state_changed.clear()
+            await client.send("status", has_control=client is self._controller, **self._state())
+
+    def _state(self) -> dict[str, Any]:
         session = self.session
-        setup = self.session.scene_state.setup
+        setup = session.scene_state.setup
         lowest, highest = map(float, setup.surface.texture.extremes)
         electronics = session.scene_state.electronics
-        status = {
+        return {
             **self.lane.status,
             BESIDE: self.second_lane.status,
             "settings": session.scene_state.settings | {BESIDE: self.second_lane.law},
@@ -286,8 +299,6 @@ class LabServer:
             "centre": session.scene_state.centre,
             "recommendation": self.recommendation.value,
         }
-        for page in tuple(self._clients):
-            await page.send("status", has_control=page is self._controller, **status)
 
     async def _wait_for_response(self) -> None:
         """Wait until the loop has processed the newest request: two samples."""
