@@ -189,8 +189,8 @@ _MAX_UNASKED_CASES = 10_000
     "--vary",
     metavar="KEY=VALUES",
     multiple=True,
-    help="Vary a key of the scene: KEY=START:STOP:COUNT, KEY=START:STOP:COUNTlog or KEY=a,b,c;"
-    " may be repeated, for all combinations.",
+    help="Vary a key of the scene, such as 'device=touch,omega.3': KEY=START:STOP:COUNT,"
+    " KEY=START:STOP:COUNTlog or KEY=a,b,c; may be repeated, for all combinations.",
 )
 @argument_options([_RUN, _DESIGN, _SCHEDULER, JOBS])
 @_laws_option
