@@ -37,8 +37,9 @@ from asperity.laws import LAWS as LAWS_BY_LETTER
 from asperity.loop import lane_loop
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
-from asperity.simulation.lanes import BatchSimulation, SegmentStatistics, StopRule, Trajectory
+from asperity.simulation.lanes import BatchSimulation, StopRule, Trajectory
 from asperity.simulation.onset_search import limit_cycle_rule
+from asperity.simulation.trace import SegmentStatistics
 from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
 from asperity.textures.texture import Texture
@@ -52,7 +53,6 @@ CEILINGS = {"A": 0.09, "E": 0.39}
 SEARCH_LOOPS, LOOPS = 500, 2000
 SEED = 20261124
 DURATION = 1.0  # [s] of the first run; one that still moves is extended to 16 times as long
-LASTING_SHARE = 0.9  # of the loss that the texture supplies in a motion that lasts
 DELAYS = (0, 0, 1, 2, 6)
 MAX_GAIN = 50.0  # a law whose q is greater has no start to speak of
 CURVE_FACTORS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
@@ -259,11 +259,11 @@ def lasting_motion(
         loop.velocity,
     )
     seen: list[SegmentStatistics] = []
-    rule = _record(limit_cycle_rule(lambda times: round(times * DURATION / loop.period)), seen)
-    run = batch.new_trajectory(stiffness, loop.delay, np.zeros(3), rule)
+    rule = limit_cycle_rule(lambda times: round(times * DURATION / loop.period), loop.period)
+    run = batch.new_trajectory(stiffness, loop.delay, np.zeros(3), _record(rule, seen))
     while run.verdict is None:
         batch.run([run])
-    if not run.verdict or not _is_sustained(seen):
+    if not run.verdict:
         return None
     spread, extent = seen[-1].velocity_spread, seen[-1].position_spread
     return Motion(loop.number, spread, extent, _speed_norm(run, seen))
@@ -277,17 +277,6 @@ def _speed_norm(run: Trajectory, seen: list[SegmentStatistics]) -> float:
         for first in (lane_loop.VELOCITY_SUM, lane_loop.VELOCITY_SQUARES)
     )
     return math.sqrt(float(np.sum(squares / count - (sums / count) ** 2)))
-
-
-def _is_sustained(seen: list[SegmentStatistics]) -> bool:
-    """Return whether in the last quarter the texture supplies what damping takes, or most of it.
-
-    A lightly damped handle that bounces for a minute is supplied with a part of it.
-    """
-    if len(seen) < 2 or seen[-1].stop:
-        return True
-    supplied, taken = (seen[-1].previous_energies[i] - seen[-2].energies[i] for i in range(2))
-    return supplied > LASTING_SHARE * taken
 
 
 def _record(rule: StopRule, seen: list[SegmentStatistics]) -> StopRule:

@@ -12,7 +12,7 @@ from asperity.core.checks import FloatArray
 from asperity.perception.grip import load_grip
 from asperity.simulation import Run
 from asperity.simulation.hands import Motion
-from asperity.simulation.onset_search import DURATION_FACTORS
+from asperity.simulation.onset_search import DURATION_FACTORS, felt_speed
 from asperity.simulation.trace import StopReason
 
 
@@ -49,13 +49,57 @@ def is_cycling(run: Run, threshold: float | None = None) -> bool:
     """Return whether a run ends in motion that the texture feeds, or diverged."""
     if run.stop is StopReason.DIVERGED:
         return True
-    return is_moving(run, threshold) and run.tail is not None and run.tail.gains_energy
+    supplied, taken, _error = supplied_energy(run)
+    return is_moving(run, threshold) and bool(supplied > 0.2 * taken)
 
 
 def is_settling(run: Run, factor: float = 16.0) -> bool:
-    """Return whether the remaining motion decreases by a tenth or more per quarter of 16 spans."""
-    ratio = 0.9 ** (factor / 16.0)
+    """Return whether the motion decreases by a tenth or more per quarter of 16 spans."""
+    ratio = 0.9 ** min(factor / 16.0, 1.0)
     return not run.stop and velocity_spread(run) < ratio * velocity_spread(run, quarter=2)
+
+
+def supplied_energy(run: Run) -> tuple[float, float, float]:
+    """Return energy supplied and taken between the middles of the last quarters, and its error."""
+    columns = run.energies["supplied"].sum(axis=1), run.energies["lost"] - run.energies["friction"]
+    supplied, taken = (np.array_split(column, 4)[2:] for column in columns)
+    spreads = [(more - less).std() for more, less in zip(supplied, taken, strict=True)]
+    part = np.array_split(run.position, 4)[3]
+    frequency = velocity_spread(run) / (2.0 * np.pi * part.std(axis=0).sum())
+    count = frequency * len(part) * run.period
+    error = sum(spreads) * np.sqrt(2.0) / (np.pi * count)
+    return np.diff([x.mean() for x in supplied])[0], np.diff([x.mean() for x in taken])[0], error
+
+
+def lasts(run: Run, factor: float, threshold: float | None) -> bool | None:
+    """Return whether a run ends in a cycle that lasts; ``None`` if a longer run must tell."""
+    if run.stop is StopReason.DIVERGED or not is_moving(run, threshold):
+        return run.stop is StopReason.DIVERGED
+    supplied, taken, error = supplied_energy(run)
+    if run.stop:
+        return bool(supplied > 0.2 * taken)
+    part = np.array_split(run.position, 4)[3]
+    turns = velocity_spread(run) / part.std(axis=0).sum() * len(part) * run.period
+    longest = factor == DURATION_FACTORS[-1]
+    if factor == 1.0 or (turns < 4.0 * 2.0 * np.pi and not longest):
+        return None
+    settling = is_settling(run, factor)
+    steady = not settling and supplied + (error if longest else -error) > 0.9 * taken
+    if steady or longest:
+        return bool(steady)
+    is_open = factor < 16.0 or may_last(run, settling, threshold, supplied + error > 0.2 * taken)
+    return None if is_open else False
+
+
+def may_last(run: Run, settling: bool, threshold: float | None, fed: bool) -> bool:
+    """Return whether a motion that settles as it does is felt after 64 spans, and is fed."""
+    part = np.array_split(run.position, 4)[3]
+    change = velocity_spread(run) / velocity_spread(run, quarter=2)
+    # The middle of the last quarter of 64 spans is 7/8 (64 - 16) spans later, quarters of 4 spans.
+    left = min(change, 1.0) ** (42.0 / 4.0) if settling else 1.0
+    speed, extent = left * velocity_spread(run), left * part.std(axis=0).sum()
+    felt = felt_speed(speed, extent) if threshold is None else threshold
+    return fed and bool(speed > felt)
 
 
 def ends_in_cycle(
@@ -64,8 +108,7 @@ def ends_in_cycle(
     """Return whether a loop ends in a limit cycle, and its longest run."""
     for factor in DURATION_FACTORS:
         run = run_for(factor * duration)
-        if run.stop or not is_moving(run, threshold):
-            break
-        if factor > 1.0 and not is_settling(run, factor):
-            break
-    return is_cycling(run, threshold) and not is_settling(run, factor), run
+        verdict = lasts(run, factor, threshold)
+        if verdict is not None:
+            return verdict, run
+    raise AssertionError("the longest run decides")

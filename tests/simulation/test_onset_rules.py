@@ -15,14 +15,23 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.perception.grip import load_grip
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, Strokes, find_onset, onset
-from asperity.simulation.lanes import MAX_LANES, SegmentStatistics
+from asperity.simulation.lanes import MAX_LANES
 from asperity.simulation.onset import Onset, find_onsets, is_at_rest, start_offsets
-from asperity.simulation.onset_search import bracket_onset, felt_speed, limit_cycle_rule
-from asperity.simulation.trace import StopReason
+from asperity.simulation.onset_search import (
+    MotionState,
+    bracket_onset,
+    felt_speed,
+    limit_cycle_rule,
+    motion_state,
+)
+from asperity.simulation.trace import SegmentStatistics, StopReason
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
 SURFACE = Surface(Sinusoid(0.2e-3, 2e-3), "A", max_depth=1e-3)
+
+
+PERIOD = 1e-3  # [s]
 
 
 def apply_rule(
@@ -35,7 +44,7 @@ def apply_rule(
         first: samples of the first run, before it is extended.
         threshold: spread of the velocity of a limit cycle [m/s].
     """
-    rule = limit_cycle_rule(lambda times: round(times * first), threshold)
+    rule = limit_cycle_rule(lambda times: round(times * first), PERIOD, threshold)
     goals = [next(rule)]
     for number, segment in enumerate(segments):
         try:
@@ -49,9 +58,7 @@ def apply_rule(
 def make_segment(
     spread: float = 0.0, supplied: float = 0.0, taken: float = 0.0, stop: str = "", samples: int = 0
 ) -> SegmentStatistics:
-    """Return statistics of a segment, with the same energies one sample earlier."""
-    energies = supplied, taken
-    return SegmentStatistics(samples, StopReason(stop), spread, energies, energies)
+    return SegmentStatistics(samples, StopReason(stop), spread, (supplied, taken))
 
 
 def quarters(before: float, last: float, fed: bool = True) -> tuple[SegmentStatistics, ...]:
@@ -70,7 +77,7 @@ CYCLING = quarters(2.0, 2.0)
     ("segments", "ends"),
     [
         ((*CYCLING, *quarters(1.5, 1.5)), True),
-        ((*CYCLING, *quarters(1.5, 1.5, fed=False)), False),  # moving, but not fed by the texture
+        ((*CYCLING, *2 * quarters(1.5, 1.5, fed=False)), False),  # moving, not fed by the texture
         ((*CYCLING, *quarters(1.5, 0.5)), False),  # fed, but at rest
         ((make_segment(stop="diverged"),), True),
         ((make_segment(), make_segment(), make_segment(stop="diverged")), True),
@@ -85,9 +92,9 @@ def test_cycle_moves_and_gains_energy_or_diverges(
 @pytest.mark.parametrize(
     ("segments", "ends"),
     [
-        (CYCLING[1:], True),
-        (quarters(2.0, 2.0, fed=False)[1:], False),
-        ((make_segment(9.0), make_segment(1.0, 1.0, 1.0)), False),  # at the threshold
+        (CYCLING, True),
+        (quarters(2.0, 2.0, fed=False), False),
+        (quarters(9.0, 1.0), False),  # at the threshold
     ],
 )
 def test_run_that_leaves_the_workspace_is_judged_by_its_last_quarter(
@@ -95,7 +102,7 @@ def test_run_that_leaves_the_workspace_is_judged_by_its_last_quarter(
 ) -> None:
     """Up to and including the sample at which it left."""
     verdict, goals = apply_rule(make_segment(stop="left the workspace", samples=10), *segments)
-    assert (verdict, goals) == (ends, [8, 11 - 2, 11])
+    assert (verdict, goals) == (ends, [8, 11 - 5, 11 - 2, 11])
 
 
 def test_run_that_leaves_at_once_is_not_a_cycle() -> None:
@@ -117,7 +124,8 @@ def test_default_threshold_is_what_a_hand_feels_at_the_frequency(frequency: floa
         extent = factor * amplitude / math.sqrt(2.0)
         speed = 2.0 * math.pi * frequency * extent
         segments = [replace(one, position_spread=extent) for one in quarters(speed, speed)]
-        assert apply_rule(*segments, *(segments if ends else []), threshold=None)[0] is ends
+        segments += segments if ends else []
+        assert apply_rule(*segments, first=1024, threshold=None)[0] is ends
 
 
 def test_felt_speed_beyond_the_curve_is_that_of_its_ends() -> None:
@@ -131,12 +139,60 @@ def test_felt_speed_beyond_the_curve_is_that_of_its_ends() -> None:
     assert ends[0] < slow
 
 
-@pytest.mark.parametrize(("supplied", "ends"), [(0.2, False), (0.21, True), (-1.0, False)])
-def test_cycle_gains_a_fifth_of_the_dissipated_energy(supplied: float, ends: bool) -> None:
-    """Counted over the last quarter up to its last sample; earlier energies are subtracted."""
-    before = SegmentStatistics(0, StopReason.NONE, 2.0, (0.0, 3.0), (-7.0, -7.0))
-    last = SegmentStatistics(0, StopReason.NONE, 2.0, (99.0, 99.0), (supplied, 4.0))
-    assert apply_rule(*CYCLING, make_segment(), before, last)[0] is ends
+@pytest.mark.parametrize(("supplied", "spans"), [(0.91, 1), (0.9, 3), (0.21, 3), (0.19, 2)])
+def test_cycle_that_lasts_gains_nine_tenths_of_the_loss(supplied: float, spans: int) -> None:
+    """Counted from quarter to quarter; less than a fifth is no cycle, the rest is run again."""
+    last = make_segment(2.0, 3.0 + supplied, 4.0)
+    run = (make_segment(9.0), make_segment(2.0, 3.0, 3.0), last)
+    verdict, goals = apply_rule(*CYCLING, *(spans * run))
+    assert verdict is (spans == 1)
+    assert goals[-1] == 16 * 4**spans
+
+
+@pytest.mark.parametrize(("count", "spans"), [(3.9, 2), (4.1, 1)])
+def test_quarters_of_few_oscillations_tell_nothing(count: float, spans: int) -> None:
+    """But for the longest run: an elastic surface takes and returns energy in each oscillation."""
+    duration = 16 * PERIOD  # of a quarter of the second run; four times as long in the third
+    extent = duration * 2.0 / (2.0 * math.pi * count)
+    run = [replace(one, position_spread=extent) for one in quarters(2.0, 2.0)]
+    verdict, goals = apply_rule(*run, *(spans * run))
+    assert (verdict, goals[-1]) == (True, 16 * 4**spans)
+
+
+@pytest.mark.parametrize(("spread", "spans"), [(0.02, 1), (0.5, 2)])
+def test_what_a_quarter_holds_besides_whole_oscillations_is_an_error(
+    spread: float, spans: int
+) -> None:
+    """With the error the supply must still exceed nine tenths of the loss."""
+    extent = 16 * PERIOD * 2.0 / (2.0 * math.pi * 4.1)
+    segments = [
+        replace(one, position_spread=extent, net_spread=spread) for one in quarters(2.0, 2.0)
+    ]
+    error = math.sqrt(2.0) * 2.0 * spread / (math.pi * 4.1)
+    assert (1.0 - error > 0.9) == (spans == 1)
+    calm = [replace(one, net_spread=0.0) for one in segments]
+    verdict, goals = apply_rule(*segments, *segments, *(calm if spans == 2 else []))
+    assert (verdict, goals[-1]) == (True, 16 * 4**spans)
+
+
+@pytest.mark.parametrize(
+    ("segments", "count", "state"),
+    [
+        (quarters(2.0, 1e-9), 9.0, MotionState.AT_REST),
+        (CYCLING, 9.0, MotionState.CYCLE),
+        (CYCLING, 3.0, MotionState.UNDECIDED),
+        (quarters(2.0, 1.9), 9.0, MotionState.UNDECIDED),
+        (quarters(2.0, 2.0, fed=False), 9.0, MotionState.NOT_FED),
+        ((make_segment(2.0, 5.0, 5.0), make_segment(2.0, 5.8, 6.0)), 9.0, MotionState.UNDECIDED),
+    ],
+)
+def test_state_of_a_single_run(
+    segments: tuple[SegmentStatistics, ...], count: float, state: MotionState
+) -> None:
+    """At the end of one run, which is not extended."""
+    before, last = segments[-2:]
+    extent = last.velocity_spread / (2.0 * math.pi * count)
+    assert motion_state(before, replace(last, position_spread=extent), 1.0) is state
 
 
 @pytest.mark.parametrize("rows", range(16, 24))
@@ -153,15 +209,18 @@ def test_quarters_are_split_as_by_numpy(rows: int) -> None:
         (((1.0, 1.1), (1.1, 1.0)), (16, 64), False),
         (((1.0, 1.1), (1.1, 1.1)), (16, 64), True),  # steady: no longer run needed
         (
-            ((9.0, 2.0), (2.0, 1.79), (2.0, 1.79)),
-            (16, 64, 256),
+            ((9.0, 9.0), (9.0, 8.0), (9.0, 8.0), (9.0, 8.0)),
+            (16, 64, 256, 1024),
             False,
         ),  # settling up to the longest run: it does not last
+        # So it is where it would not be felt after the longest.
+        (((9.0, 2.0), (2.0, 1.79), (2.0, 1.79)), (16, 64, 256), False),
         # A decrease of exactly a tenth does not count, nor one that would be it in a longer run.
         (((9.0, 2.0), (2.0, 1.9), (2.0, 1.8)), (16, 64, 256), True),
         (((9.0, 2.0), (2.0, 0.9**0.25 * 2.0)), (16, 64), True),
-        (((9.0, 2.0), (2.0, 0.973 * 2.0), (2.0, 1.79)), (16, 64, 256), False),
+        (((9.0, 2.0), (2.0, 0.973 * 2.0), (2.0, 1.8)), (16, 64, 256), True),
         (((9.0, 2.0), (2.0, 1.5), (1.2, 0.9)), (16, 64, 256), False),
+        (((9.0, 9.0), (9.0, 7.0), (9.0, 8.0), (4.0, 4.0)), (16, 64, 256, 1024), True),
     ],
 )
 def test_run_is_extended_while_it_settles(

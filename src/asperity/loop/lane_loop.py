@@ -40,19 +40,21 @@ STOP = COUNTERS_SIZE
 LANE_COUNTERS_SIZE = COUNTERS_SIZE + 1
 # Statistics of a lane: least and greatest position since the start; since ``SAMPLE_COUNT`` was
 # reset the number of samples, the first velocity, and the sums of the deviations from it and of
-# their squares; energies supplied by the texture and dissipated, before the last sample; the same
-# sums of positions.
+# their squares; the first energies supplied by the texture and dissipated; the same sums of
+# positions; the sums of the deviations of the energies, and of the squares of their difference.
 LOW = 0
 HIGH = 3
 SAMPLE_COUNT = 6
 BASE_VELOCITY = 7
 VELOCITY_SUM = 10
 VELOCITY_SQUARES = 13
-PREVIOUS_ENERGIES = 16
+BASE_ENERGIES = 16
 BASE_POSITION = 18
 POSITION_SUM = 21
 POSITION_SQUARES = 24
-STATISTICS_SIZE = 27
+ENERGY_SUMS = 27
+NET_SQUARES = 29
+STATISTICS_SIZE = 30
 
 
 class Lanes(NamedTuple):
@@ -276,6 +278,19 @@ def update_statistics(statistics: FloatArray, x: FloatArray, ledger: FloatArray)
     """Update the statistics of a lane with its state before a sample."""
     is_first = statistics[SAMPLE_COUNT] == 0.0
     statistics[SAMPLE_COUNT] += 1.0
+    supplied = ledger[SUPPLIED] + ledger[SUPPLIED + 1] + ledger[SUPPLIED + 2]
+    taken = ledger[LOST] - ledger[FRICTION]
+    if is_first:
+        statistics[BASE_ENERGIES] = supplied
+        statistics[BASE_ENERGIES + 1] = taken
+        statistics[ENERGY_SUMS] = 0.0
+        statistics[ENERGY_SUMS + 1] = 0.0
+        statistics[NET_SQUARES] = 0.0
+    supplied -= statistics[BASE_ENERGIES]
+    taken -= statistics[BASE_ENERGIES + 1]
+    statistics[ENERGY_SUMS] += supplied
+    statistics[ENERGY_SUMS + 1] += taken
+    statistics[NET_SQUARES] += (supplied - taken) ** 2
     for i in range(3):
         statistics[LOW + i] = min(statistics[LOW + i], x[i])
         statistics[HIGH + i] = max(statistics[HIGH + i], x[i])
@@ -292,8 +307,6 @@ def update_statistics(statistics: FloatArray, x: FloatArray, ledger: FloatArray)
         displacement = x[i] - statistics[BASE_POSITION + i]
         statistics[POSITION_SUM + i] += displacement
         statistics[POSITION_SQUARES + i] += displacement * displacement
-    statistics[PREVIOUS_ENERGIES] = ledger[SUPPLIED] + ledger[SUPPLIED + 1] + ledger[SUPPLIED + 2]
-    statistics[PREVIOUS_ENERGIES + 1] = ledger[LOST] - ledger[FRICTION]
 
 
 def stored_energy_at(x: FloatArray, anchor: FloatArray, plant: object) -> float:

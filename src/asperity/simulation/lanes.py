@@ -6,8 +6,8 @@ a batch equals, bit for bit, that of :func:`~asperity.simulation.simulate`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
 
@@ -21,11 +21,11 @@ from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
 from asperity.loop import lane_loop, no_guards, servo_loop, simulated_device
 from asperity.loop.lane_loop import Lanes
-from asperity.loop.simulated_device import DELAY, FRICTION, LEDGER_SIZE, LOST, SAMPLES, SUPPLIED
+from asperity.loop.simulated_device import DELAY, LEDGER_SIZE, SAMPLES
 from asperity.simulation.hands import Hand, Motion
 from asperity.simulation.plants import Plant, SampledPlant, sampled_plant
 from asperity.simulation.servo import Servo
-from asperity.simulation.trace import COLUMNS, StopReason
+from asperity.simulation.trace import COLUMNS, SegmentStatistics, StopReason
 from asperity.surface import Surface
 
 MAX_LANES = 8
@@ -201,28 +201,6 @@ class LaneLoop:
         return int(row_counters[0])
 
 
-@dataclass(frozen=True)
-class SegmentStatistics:
-    """Statistics of a run.
-
-    Attributes:
-        samples: samples done.
-        stop: why the run stopped.
-        velocity_spread: standard deviations of the velocity before each sample since the previous
-            evaluation, summed over the axes [m/s].
-        energies: energy supplied by the texture, and dissipated by damping and dry friction [J].
-        previous_energies: the same before the last sample.
-        position_spread: standard deviations of the position, as those of the velocity [m].
-    """
-
-    samples: int
-    stop: StopReason
-    velocity_spread: float
-    energies: tuple[float, float]
-    previous_energies: tuple[float, float]
-    position_spread: float = 0.0
-
-
 StopRule = Generator[int, SegmentStatistics, bool]
 """Yields the number of samples at its next evaluation, and returns its verdict.
 
@@ -269,6 +247,15 @@ class Trajectory(Lane):
         variance = self._statistic(squares) / count - (self._statistic(sums) / count) ** 2
         return float(np.sqrt(np.maximum(variance, 0.0)).sum())
 
+    def _energies(self) -> tuple[tuple[float, float], float]:
+        """Return the mean energies since the last evaluation, and their net spread [J]."""
+        count = float(self.statistics[lane_loop.SAMPLE_COUNT])
+        supplied, taken, squares = (self.statistics[lane_loop.ENERGY_SUMS :] / count).tolist()
+        bases = self.statistics[lane_loop.BASE_ENERGIES :]
+        variance = squares - (supplied - taken) ** 2
+        means = float(bases[0]) + supplied, float(bases[1]) + taken
+        return means, math.sqrt(max(variance, 0.0))
+
     @property
     def position_bounds(self) -> FloatArray:
         """Least and greatest position before any sample [m], shape (2, 3)."""
@@ -278,15 +265,11 @@ class Trajectory(Lane):
         """Evaluate the stop rule when its next evaluation is due."""
         if not self.stop and self.samples < self.next_evaluation:
             return
-        sums = self.ledger_sums.tolist()
-        supplied = sums[SUPPLIED] + sums[SUPPLIED + 1] + sums[SUPPLIED + 2]
-        before = self.statistics[lane_loop.PREVIOUS_ENERGIES :].tolist()
         segment = SegmentStatistics(
             self.samples,
             self.stop,
             self._spread(lane_loop.VELOCITY_SUM, lane_loop.VELOCITY_SQUARES),
-            (supplied, sums[LOST] - sums[FRICTION]),
-            (before[0], before[1]),
+            *self._energies(),
             self._spread(lane_loop.POSITION_SUM, lane_loop.POSITION_SQUARES),
         )
         self.statistics[lane_loop.SAMPLE_COUNT] = 0.0

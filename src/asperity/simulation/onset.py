@@ -94,10 +94,10 @@ def run_starts(
 ) -> list[Trajectory]:
     """Return the trajectories for each shift of the start [m], (n, 3), with their verdicts."""
     samples = _samples_for(duration, servo)
-    runs = [
-        batch.new_trajectory(stiffness, servo.delay, shift, onset_search.limit_cycle_rule(samples))
-        for shift in offsets
-    ]
+    runs = []
+    for shift in offsets:
+        rule = onset_search.limit_cycle_rule(samples, servo.period)
+        runs.append(batch.new_trajectory(stiffness, servo.delay, shift, rule))
     while active := [run for run in runs if run.verdict is None][:MAX_LANES]:
         batch.run(active)
     return runs
@@ -184,7 +184,7 @@ def find_onsets(
         nears: expected onset of each [N/m], or ``None``; see :func:`find_onset`.
         start: initial position of the handle [m], shape (3,); default: where the motion starts.
         velocity: initial velocity of the handle [m/s], shape (3,); default: at rest.
-        duration: duration of a run [s]; a run that still oscillates is extended, up to 16 times as
+        duration: duration of a run [s]; a run that still oscillates is extended, up to 64 times as
             long.
         starts: number of phases of the texture at which the handle starts.
         tolerance: width of the bracket over its lower end.
@@ -222,7 +222,7 @@ def find_onsets(
 
         def search(number: int) -> onset_search.OnsetSearch:
             def trajectory(stiffness: float, start: int) -> Trajectory:
-                rule = onset_search.limit_cycle_rule(samples, threshold)
+                rule = onset_search.limit_cycle_rule(samples, servo.period, threshold)
                 return batch.new_trajectory(stiffness, delays[number], offsets[start], rule)
 
             bracketing = onset_search.bracket_onset(lowest, highest, width, nears[number])

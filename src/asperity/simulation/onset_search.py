@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import replace
+from enum import StrEnum
 from functools import cache
 from itertools import islice
 from typing import NamedTuple
@@ -15,20 +17,25 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.perception.grip import Grip, load_grip
-from asperity.simulation.lanes import (
-    MAX_LANES,
-    BatchSimulation,
-    SegmentStatistics,
-    StopRule,
-    Trajectory,
-)
-from asperity.simulation.trace import SUPPLY_SHARE, StopReason
+from asperity.simulation.lanes import MAX_LANES, BatchSimulation, StopRule, Trajectory
+from asperity.simulation.trace import SegmentStatistics, StopReason, ends_of_quarters
 
 # A run that still oscillates is extended by these factors, up to the last one.
-DURATION_FACTORS = (1.0, 4.0, 16.0)
-# A motion whose spread in the last quarter of the longest run is below this share of that in the
-# quarter before is decaying; in a shorter run it is one that decays as fast.
+DURATION_FACTORS = (1.0, 4.0, 16.0, 64.0)
+# A motion whose spread in the last quarter of a run is below this share of that in the quarter
+# before is decaying: from the third factor on; in a shorter run it is one that decays as fast.
 _DECAY_RATIO = 0.9
+_DECAY_FACTOR = 16.0
+_STEADY_RATIO = _DECAY_RATIO**0.25  # of a single run
+# Of what damping and dry friction take, the texture supplies all in a motion that lasts; less where
+# it beats.
+_LASTING_SHARE = 0.9
+# A motion that is supplied with less is not fed: it swings or falls by itself.
+_SUPPLY_SHARE = 0.2
+# With fewer oscillations a quarter tells neither decay nor supply.
+_MIN_OSCILLATIONS = 4.0
+# From the middle of the last quarter of a run to that of a run twice as long, in quarters.
+_QUARTERS_PER_RUN = 3.5
 # With fewer samples a quarter is a single sample, without spread.
 _MIN_SAMPLES = 8
 
@@ -63,41 +70,142 @@ def _default_grip() -> Grip:
     return load_grip()
 
 
-def limit_cycle_rule(samples: Callable[[float], int], threshold: float | None = None) -> StopRule:
+def limit_cycle_rule(
+    samples: Callable[[float], int], period: float, threshold: float | None = None
+) -> StopRule:
     """Return the stop rule that detects a limit cycle: an oscillation fed by the texture.
 
     A run oscillates if, in its last quarter, the standard deviations of the velocity, summed over
     the axes, exceed the threshold: by default what a hand feels, :func:`felt_speed`. For a cycle in
     place this sum is rms(vx) + rms(vy) + rms(vz); sinking at constant speed does not count. It is
-    fed if in that quarter the texture supplies at least a fifth of the loss in damping and dry
-    friction; on average it supplies all of it. A handle that swings or falls by itself is no limit
+    fed if from the quarter before to that quarter the texture supplies, on average, at least a
+    fifth of the loss in damping and dry friction. The energy that an elastic surface takes and
+    returns in every oscillation may be many times the loss: what a quarter holds of it besides
+    whole oscillations is counted as an error. A handle that swings or falls by itself is no limit
     cycle; a handle that leaves the workspace while it is fed is one, and so is a diverged run.
 
-    A run that still oscillates is extended, to 4 and 16 times its duration, until the oscillation
-    decays by less than a tenth per quarter of the longest run; if it still decays faster, it does
-    not last.
+    A run that still oscillates is extended, to 4, 16 and 64 times its duration, until it is clear
+    whether the motion lasts: it does if it decays by less than a tenth per quarter of 16 durations
+    and the texture supplies nine tenths of the loss at least. It does not if it is not fed, or
+    decays so that it would not be felt after 64 durations.
 
     Args:
         samples: number of samples of a run, by the factor of its duration.
+        period: of a sample [s].
         threshold: [m/s]; ``None``: what a hand feels.
     """
     for factor in DURATION_FACTORS:
         rows = samples(factor)
-        quarter = rows // 4
-        # Quarters as NumPy splits: the remainder goes to the first ones.
-        third = rows - 2 * quarter - (rows % 4 == 3)
         segments: list[SegmentStatistics] = []
-        for goal in (third, rows - quarter, rows):
+        for goal in ends_of_quarters(rows):
             segments.append((yield goal))
             if segments[-1].stop:
                 return (yield from _judge_stopped_run(segments[-1], threshold))
         _, before, last = segments
         if not _oscillates(last, threshold):
             return False
-        lasting = _DECAY_RATIO ** (factor / DURATION_FACTORS[-1]) * before.velocity_spread
-        if factor > 1.0 and not last.velocity_spread < lasting:
-            return _gains_energy(before, last)
+        if factor > 1.0:
+            verdict = _verdict(before, last, threshold, rows // 4 * period, factor)
+            if verdict is not None:
+                return verdict
     return False
+
+
+def _verdict(
+    before: SegmentStatistics,
+    last: SegmentStatistics,
+    threshold: float | None,
+    duration: float,
+    factor: float,
+) -> bool | None:
+    """Return whether a felt motion lasts, by its last quarters [s]; ``None``: it is not clear."""
+    is_longest = factor == DURATION_FACTORS[-1]
+    count = _oscillation_count(last, duration)
+    if count < _MIN_OSCILLATIONS and not is_longest:
+        return None
+    energies = _supplied_energy(before, last, count)
+    ratio = _DECAY_RATIO ** min(factor / _DECAY_FACTOR, 1.0)
+    decays = last.velocity_spread < ratio * before.velocity_spread
+    if not decays and energies.least > _LASTING_SHARE * energies.taken:
+        return True
+    if is_longest:
+        return not decays and energies.most > _LASTING_SHARE * energies.taken
+    if factor < _DECAY_FACTOR:  # what is left of the start may hide a cycle
+        return None
+    left = 1.0
+    if decays:
+        quarters = _QUARTERS_PER_RUN * (DURATION_FACTORS[-1] / factor - 1.0)
+        left = (last.velocity_spread / before.velocity_spread) ** quarters
+    is_fed = energies.most > _SUPPLY_SHARE * energies.taken
+    if is_fed and _oscillates(_scaled(last, left), threshold):
+        return None
+    return False
+
+
+class MotionState(StrEnum):
+    """What a handle does at the end of a run."""
+
+    AT_REST = "at rest"
+    """Its motion is not felt."""
+    CYCLE = "cycle"
+    """It oscillates, and the texture supplies what damping takes."""
+    NOT_FED = "not fed"
+    """It moves, and the texture supplies less than a fifth of what damping takes."""
+    UNDECIDED = "undecided"
+    """It moves, and the run is too short to tell whether that lasts."""
+
+
+def motion_state(
+    before: SegmentStatistics, last: SegmentStatistics, duration: float
+) -> MotionState:
+    """Return what a handle does at the end of a run, by its last quarters of a duration [s]."""
+    if not _oscillates(last, None):
+        return MotionState.AT_REST
+    count = _oscillation_count(last, duration)
+    if count < _MIN_OSCILLATIONS:
+        return MotionState.UNDECIDED
+    energies = _supplied_energy(before, last, count)
+    if energies.most <= _SUPPLY_SHARE * energies.taken:
+        return MotionState.NOT_FED
+    decays = last.velocity_spread < _STEADY_RATIO * before.velocity_spread
+    if decays or energies.least <= _LASTING_SHARE * energies.taken:
+        return MotionState.UNDECIDED
+    return MotionState.CYCLE
+
+
+class _SuppliedEnergy(NamedTuple):
+    """Bounds of the energy that the texture supplied, and the loss, between two quarters [J]."""
+
+    least: float
+    most: float
+    taken: float
+
+
+def _supplied_energy(
+    before: SegmentStatistics, last: SegmentStatistics, count: float
+) -> _SuppliedEnergy:
+    """Return the energies from one quarter to the next, on average of each.
+
+    An oscillation of amplitude a adds to the average of n periods at most a/(πn), if a part of one
+    remains.
+    """
+    supplied = last.mean_energies[0] - before.mean_energies[0]
+    taken = last.mean_energies[1] - before.mean_energies[1]
+    error = math.sqrt(2.0) * (before.net_spread + last.net_spread) / (math.pi * count)
+    return _SuppliedEnergy(supplied - error, supplied + error, taken)
+
+
+def _oscillation_count(segment: SegmentStatistics, duration: float) -> float:
+    """Return how many oscillations of RMS speed and displacement a duration [s] holds."""
+    if not segment.position_spread > 0.0:
+        return math.inf
+    return duration * segment.velocity_spread / (2.0 * math.pi * segment.position_spread)
+
+
+def _scaled(segment: SegmentStatistics, factor: float) -> SegmentStatistics:
+    """Return the statistics of the same motion with another amplitude."""
+    speed = factor * segment.velocity_spread
+    return replace(segment, velocity_spread=speed, position_spread=factor * segment.position_spread)
 
 
 def _judge_stopped_run(
@@ -109,9 +217,12 @@ def _judge_stopped_run(
     rows = segment.samples + 1  # with the sample that the body could not follow
     if rows < _MIN_SAMPLES:
         return False
-    first = yield rows - rows // 4
-    last = yield rows
-    return _oscillates(last, threshold) and _gains_energy(first, last)
+    second, third, last_row = ends_of_quarters(rows)
+    yield second
+    before = yield third
+    last = yield last_row
+    energies = _supplied_energy(before, last, math.inf)
+    return _oscillates(last, threshold) and energies.most > _SUPPLY_SHARE * energies.taken
 
 
 def _oscillates(segment: SegmentStatistics, threshold: float | None) -> bool:
@@ -119,13 +230,6 @@ def _oscillates(segment: SegmentStatistics, threshold: float | None) -> bool:
     if threshold is None:
         threshold = felt_speed(speed, segment.position_spread)
     return speed > threshold
-
-
-def _gains_energy(first: SegmentStatistics, last: SegmentStatistics) -> bool:
-    """Return whether the texture delivers energy between two segments."""
-    supplied = last.previous_energies[0] - first.energies[0]
-    taken = last.previous_energies[1] - first.energies[1]
-    return supplied > SUPPLY_SHARE * taken
 
 
 _COARSE_FACTOR = 2.0  # factor between the stiffnesses of the coarse search

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -106,72 +107,125 @@ _SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
 _ANCHOR = [_NAMES.index(f"law anchor {axis}") for axis in "xyz"]
 _LOST = _NAMES.index("lost")
 _FRICTION = _NAMES.index("friction")
-# Smallest share of the loss that the texture supplies in a cycle: not always all, as amplitudes
-# beat.
-SUPPLY_SHARE = 0.2
+_TAIL_NUMBERS = 9  # position, velocity, and three energies
+
+
+MAX_ROWS = 20_000
+
+
+class StopReason(StrEnum):
+    """Why a run stops early."""
+
+    NONE = ""
+    DIVERGED = "diverged"
+    """The state exceeds 1e6 in SI units."""
+    LEFT_WORKSPACE = "left the workspace"
+
+
+@dataclass(frozen=True)
+class SegmentStatistics:
+    """Statistics of a part of a run.
+
+    Attributes:
+        samples: samples done.
+        stop: why the run stopped.
+        velocity_spread: standard deviations of the velocity before each sample of the part, summed
+            over the axes [m/s].
+        mean_energies: energy that the texture has supplied since the start, and that damping and
+            dry friction have taken, on average of those samples [J].
+        net_spread: standard deviation of their difference [J].
+        position_spread: standard deviations of the position, as those of the velocity [m].
+    """
+
+    samples: int
+    stop: StopReason
+    velocity_spread: float
+    mean_energies: tuple[float, float]
+    net_spread: float = 0.0
+    position_spread: float = 0.0
+
+
+def ends_of_quarters(rows: int) -> tuple[int, int, int]:
+    """Return the ends of the second to the last quarter, as NumPy splits: the first are longer."""
+    quarter = rows // 4
+    return rows - 2 * quarter - (rows % 4 == 3), rows - quarter, rows
 
 
 class TailStatistics:
-    """Statistics of the last quarter of a run: spread of the velocity, and energies.
+    """Statistics of the last quarters of a run.
 
     Args:
         rows: number of rows that the trace will have.
     """
 
     def __init__(self, rows: int) -> None:
-        self._tail_start = rows - rows // 4
-        self._energy_start = rows - max(rows // 4, 2)
-        self._rows_total = rows
+        self._ends = ends_of_quarters(rows)
         self._rows_seen = 0
-        self._count_in_tail = 0
-        self._mean = np.zeros((2, 3))
-        self._squares = np.zeros((2, 3))
-        self._first_row = np.zeros(len(COLUMNS))
-        self._last_row = np.zeros(len(COLUMNS))
+        self._moments = _Moments(), _Moments()
 
     @property
     def is_complete(self) -> bool:
         """Whether all rows have been seen, and are enough for a verdict."""
-        return self._rows_seen == self._rows_total >= _MIN_ROWS
+        return self._rows_seen == self._ends[-1] >= _MIN_ROWS
+
+    @property
+    def last_quarters(self) -> tuple[SegmentStatistics, SegmentStatistics]:
+        """Statistics of the last quarter but one, and of the last."""
+        before, last = self._moments
+        return before.statistics(self._ends[1]), last.statistics(self._ends[2])
 
     @property
     def velocity_spread(self) -> float:
-        """Standard deviations of the velocity, summed over the axes [m/s]."""
-        return float(np.sqrt(self._squares[1] / self._count_in_tail).sum())
+        """Standard deviations of the velocity in the last quarter, summed over the axes [m/s]."""
+        return self.last_quarters[1].velocity_spread
 
     @property
     def position_spread(self) -> float:
-        """Standard deviations of the position, summed over the axes [m]."""
-        return float(np.sqrt(self._squares[0] / self._count_in_tail).sum())
-
-    @property
-    def gains_energy(self) -> bool:
-        """Whether the texture supplies at least a fifth of what damping and friction take."""
-        change = self._last_row - self._first_row
-        taken = change[_LOST] - change[_FRICTION]
-        return bool(change[_SUPPLIED].sum() > SUPPLY_SHARE * taken)
+        """Standard deviations of the position in the last quarter, summed over the axes [m]."""
+        return self.last_quarters[1].position_spread
 
     def update(self, rows: FloatArray) -> None:
         """Update the statistics with the next rows of the trace, shape (n, columns)."""
-        first = self._rows_seen
+        ends = [max(end - self._rows_seen, 0) for end in self._ends]
         self._rows_seen = self._rows_seen + len(rows)
-        if first <= self._energy_start < self._rows_seen:
-            self._first_row = rows[self._energy_start - first].copy()
-        part = rows[max(self._tail_start - first, 0) :]
-        if len(rows):
-            self._last_row = rows[-1].copy()
-        if not len(part):
+        for moments, (start, end) in zip(self._moments, pairwise(ends), strict=True):
+            moments.update(rows[start:end])
+
+
+class _Moments:
+    """Means and squares of position, velocity and energies over some rows of a trace."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._means = np.zeros(_TAIL_NUMBERS)
+        self._squares = np.zeros(_TAIL_NUMBERS)
+
+    def update(self, rows: FloatArray) -> None:
+        if not len(rows):
             return
+        supplied = rows[:, _SUPPLIED].sum(axis=1)
+        taken = rows[:, _LOST] - rows[:, _FRICTION]
+        energies = supplied, taken, supplied - taken
+        values = np.column_stack([rows[:, _POSITION], rows[:, _VELOCITY], *energies])
         # Mean and squares of two parts are merged without a difference of large numbers.
-        total = self._count_in_tail + len(part)
-        for i, columns in enumerate((_POSITION, _VELOCITY)):
-            values = part[:, columns]
-            mean = values.mean(axis=0)
-            change = mean - self._mean[i]
-            self._squares[i] += ((values - mean) ** 2).sum(axis=0)
-            self._squares[i] += change**2 * (self._count_in_tail * len(part) / total)
-            self._mean[i] += change * (len(part) / total)
-        self._count_in_tail = total
+        total = self._count + len(values)
+        mean = values.mean(axis=0)
+        change = mean - self._means
+        self._squares += ((values - mean) ** 2).sum(axis=0)
+        self._squares += change**2 * (self._count * len(values) / total)
+        self._means += change * (len(values) / total)
+        self._count = total
+
+    def statistics(self, samples: int) -> SegmentStatistics:
+        spreads = np.sqrt(self._squares / self._count)
+        return SegmentStatistics(
+            samples,
+            StopReason.NONE,
+            float(spreads[3:6].sum()),
+            (float(self._means[6]), float(self._means[7])),
+            float(spreads[8]),
+            float(spreads[:3].sum()),
+        )
 
 
 class RunCounts:
@@ -219,18 +273,6 @@ class RunCounts:
         if len(low):
             depths = self._surface.law.contact.depth(self._surface.texture, low)
         self.limits.count(rows[:, _COMMANDED], depths)
-
-
-MAX_ROWS = 20_000
-
-
-class StopReason(StrEnum):
-    """Why a run stops early."""
-
-    NONE = ""
-    DIVERGED = "diverged"
-    """The state exceeds 1e6 in SI units."""
-    LEFT_WORKSPACE = "left the workspace"
 
 
 @dataclass(frozen=True)

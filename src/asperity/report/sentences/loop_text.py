@@ -22,7 +22,7 @@ from asperity.servo.loop_memory import EndReason, LoopStatistics
 from asperity.servo.process import ServoProcess
 from asperity.simulation import Run
 from asperity.simulation.onset import Prediction, is_at_rest
-from asperity.simulation.onset_search import felt_speed
+from asperity.simulation.onset_search import MotionState, felt_speed, motion_state
 from asperity.simulation.scan import Stroke
 from asperity.surface import Surface
 
@@ -83,19 +83,28 @@ def search_error_text(run: Run) -> str:
     return f"{share}: another point was nearer by at most {distance}"
 
 
+_MOTION_TEXT = {
+    MotionState.AT_REST: "comes to rest",
+    MotionState.CYCLE: "keeps moving: a limit cycle",
+    MotionState.NOT_FED: "still moves, but the texture does not feed it",
+    MotionState.UNDECIDED: "still moves; a longer run tells whether it comes to rest",
+}
+
+
 def rest_text(setup: Setup, run: Run) -> str:
     """Return whether the handle came to rest."""
     if not is_at_rest(setup.motion, run.duration):
         return "The hand was moving to the end"
     if run.tail is None or not run.tail.is_complete:
         return "Too few samples were traced to decide whether the handle came to rest"
-    speed = run.tail.velocity_spread
-    felt = felt_speed(speed, run.tail.position_spread)
-    verdict = "comes to rest"
-    if speed > felt and run.tail.gains_energy:
-        verdict = "keeps moving: a limit cycle"
-        if setup.servo.position_resolution or setup.servo.force_resolution:
-            verdict = "keeps moving: a limit cycle, or the chatter of steps"
+    before, last = run.tail.last_quarters
+    speed = last.velocity_spread
+    felt = felt_speed(speed, last.position_spread)
+    state = motion_state(before, last, 0.25 * run.duration)
+    verdict = _MOTION_TEXT[state]
+    has_steps = setup.servo.position_resolution or setup.servo.force_resolution
+    if state is MotionState.CYCLE and has_steps:
+        verdict += ", or the chatter of steps"
     limit = format_quantity(felt, "m/s", digits=3)
     spread = format_quantity(speed, "m/s", digits=3)
     return sentence("rest", verdict=verdict, spread=spread, limit=limit)
