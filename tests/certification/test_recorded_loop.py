@@ -141,6 +141,28 @@ def test_energy_along_exact_positions_is_named_beside_the_one_in_encoder_steps(
         assert "Supplied" not in facts
 
 
+@pytest.mark.parametrize("is_early", [True, False])
+def test_force_before_the_delay_of_an_early_recording_is_shifted(
+    tmp_path: Path, is_early: bool
+) -> None:
+    heights = -1e-3 + 1e-4 * np.sin(0.1 * np.arange(100))
+    prompt, late = make_samples(heights), make_samples(heights, lag=3)
+    late.forces[:3] = 0.0
+    forces = (prompt if is_early else late).forces
+    columns = (("time", "s"), *[(axis, "m") for axis in "xyz"])
+    columns += tuple((f"applied {axis}", "N") for axis in "xyz")
+    metadata = {"made_by": "run", "servo": {"delay": 3, "position_resolution": 1e-5}}
+    metadata |= {} if is_early else {"has_applied_delay": True}
+    path = tmp_path / "run.mcap"
+    with RecordingWriter(path, (*columns, ("supplied", "J")), metadata) as writer:
+        writer.append(np.column_stack([late.times, late.positions, forces, np.zeros(100)]))
+    samples = read_samples(path)
+    np.testing.assert_array_equal(samples.forces, late.forces)
+    assert (samples.measured_energy is None) == is_early
+    facts = dict(recording_facts(open_recording(path)))
+    assert ("Applied, supplied" in facts) == is_early
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

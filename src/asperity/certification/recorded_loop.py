@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from asperity.core.files import Serializable, open_input
 from asperity.core.units import parse_quantity
 from asperity.recording.recorded_field import LimitCounts
 from asperity.recording.recording import is_recording, open_recording
-from asperity.recording.replay import recorded_limits, rounded_step
+from asperity.recording.replay import omitted_delay, recorded_limits, rounded_step
 
 MAX_LAG = 3
 _MAX_BYTES = 2**31
@@ -144,36 +144,45 @@ def read_samples(path: str | Path) -> RecordedSamples:
             whose time runs backwards.
     """
     place = Path(path)
-    limits = None
-    resolution = 0.0
-    measured_energy = None
-    if is_recording(place):
-        recording = open_recording(place)
-        names = recording.names
-        force = "applied" if "applied x" in names else "commanded"
-        columns = ["time", *_AXES, *[f"{force} {axis}" for axis in _AXES]]
-        limits = recorded_limits(recording)
-        resolution = rounded_step(recording)
-        rows = recording.table()
-        table = rows[:, [names.index(column) for column in columns if column in names]]
-        if resolution and "supplied" in names and len(rows):
-            supplied = names.index("supplied")
-            measured_energy = float(rows[-1, supplied] - rows[0, supplied])
-        if table.shape[1] != len(columns):
-            raise ParameterError("recording", f"{place} lacks one of the columns {columns}")
-    else:
-        table = _read_csv(place)
-    times = table[:, 0]
-    backwards = np.flatnonzero(np.diff(times) <= 0.0)
+    samples = _read_rows(place) if is_recording(place) else _named_samples(place, _read_csv(place))
+    backwards = np.flatnonzero(np.diff(samples.times) <= 0.0)
     if len(backwards):
         number = int(backwards[0]) + 1
         raise ParameterError("recording", f"{place}: time does not increase after row {number}")
-    if len(times) < 16:
-        raise ParameterError("recording", f"{place} has {len(times)} rows; 16 are needed")
-    positions = table[:, 1:4]
-    forces = table[:, 4:7]
-    return RecordedSamples(
-        place.name, times, positions, forces, limits, resolution, measured_energy
+    if len(samples.times) < 16:
+        rows = len(samples.times)
+        raise ParameterError("recording", f"{place} has {rows} rows; 16 are needed")
+    return samples
+
+
+def _named_samples(path: Path, table: FloatArray) -> RecordedSamples:
+    """Return the samples of a table of time, position and force, shape (n, 7)."""
+    return RecordedSamples(path.name, table[:, 0], table[:, 1:4], table[:, 4:7])
+
+
+def _read_rows(path: Path) -> RecordedSamples:
+    """Return the samples of a recording (MCAP), and what it says of them."""
+    recording = open_recording(path)
+    names = recording.names
+    force = "applied" if "applied x" in names else "commanded"
+    columns = ["time", *_AXES, *[f"{force} {axis}" for axis in _AXES]]
+    rows = recording.table()
+    table = rows[:, [names.index(column) for column in columns if column in names]]
+    if table.shape[1] != len(columns):
+        raise ParameterError("recording", f"{path} lacks one of the columns {columns}")
+    early = omitted_delay(recording)
+    table[early:, 4:] = table[: len(table) - early, 4:].copy()
+    table[:early, 4:] = 0.0
+    resolution = rounded_step(recording)
+    measured_energy = None
+    if resolution and not early and "supplied" in names and len(rows):
+        supplied = names.index("supplied")
+        measured_energy = float(rows[-1, supplied] - rows[0, supplied])
+    return replace(
+        _named_samples(path, table),
+        limits=recorded_limits(recording),
+        position_resolution=resolution,
+        measured_energy=measured_energy,
     )
 
 

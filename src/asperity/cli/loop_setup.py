@@ -188,7 +188,7 @@ def driver_setup(
 ) -> tuple[Setup, Servo]:
     """Return the set-up for a driver, and the servo parameters of the scene.
 
-    A real device has its own quantisation and delay: the loop adds none.
+    A real device has its own quantisation and delay: the loop adds neither.
 
     Raises:
         ParameterError: for a missing, unknown or invalid value.

@@ -59,7 +59,7 @@ class SceneState:
         base_texture: its texture without the magnification.
         magnification: factors of its size and of its height.
         initial_texture: source and texture at the start, which may be of a file.
-        device_servo: steps and delay of a real device by the catalogue; the loop adds none.
+        device_servo: steps and delay of a real device by the catalogue; the loop adds neither.
     """
 
     setup: Setup

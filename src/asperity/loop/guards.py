@@ -1,9 +1,9 @@
 """The guards of a loop between law and motor: reach, depth, ramp, force, timing.
 
-The passivity observer sums the energy given to the hand, E += f·Δp, with the force held over the
-sample and the measured displacement. For a force that is held from sample to sample this is the
-exact work, and needs no velocity. The controller dissipates it by damping: α = E/(T v²) dissipates
-α v² T = E over the next sample.
+The passivity observer sums the energy given to the hand, E += f·Δp, with the force that acts over
+the sample, commanded the device's delay ago, and the measured displacement. For a force held from
+sample to sample this is the exact work, and needs no velocity. The controller dissipates it by
+damping: α = E/(T v²) dissipates α v² T = E over the next sample, after the delay.
 
 Reference:
     Hannaford and Ryu, "Time-domain passivity control of haptic interfaces", IEEE Transactions on
@@ -39,10 +39,12 @@ from asperity.loop.interface import (
     device_write,
 )
 from asperity.loop.shared_trace import (
+    APPLIED,
     DEEP_COUNT,
     DEEPEST,
     FORCE_LIMIT_COUNT,
     HEARTBEAT_WORD,
+    ROW_COUNT,
     SLEW_LIMIT_COUNT,
     STOP_WORD,
     SharedBlock,
@@ -252,7 +254,10 @@ def guard_force(
     dx = servo.x - before.x
     dy = servo.y - before.y
     dz = servo.z - before.z
-    energy = force.energy + force.fx * dx + force.fy * dy + force.fz * dz
+    rows = guards.block.rows
+    last = (status[ROW_COUNT] - 1) % rows.shape[0]
+    energy = force.energy + rows[last, APPLIED] * dx
+    energy += rows[last, APPLIED + 1] * dy + rows[last, APPLIED + 2] * dz
     max_damping = limits.max_damping if ramp > 0.0 else 0.0
     damping = passivity_damping(energy, dx, dy, dz, settings.period, max_damping)
     drag = damping / settings.period

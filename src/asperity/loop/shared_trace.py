@@ -60,6 +60,8 @@ COLUMNS = (
     ("law anchor z", "m"),
 )
 """Columns of the rows with their units; positions and forces are in the surface's frame."""
+# The first of the columns of the applied force.
+APPLIED = 7
 
 
 class SharedBlock(NamedTuple):
@@ -70,12 +72,15 @@ class SharedBlock(NamedTuple):
         status: words written by the loop (``STATUS_SIZE``,).
         rows: the newest rows, the k-th at k modulo their number (n, columns).
         swap: nonzero while another surface is ready (1,).
+        pending: the newest commanded forces, the k-th at k modulo their number (the delay of the
+            device in samples + 1, 3) [N].
     """
 
     control: IntArray
     status: IntArray
     rows: FloatArray
     swap: IntArray
+    pending: FloatArray
 
 
 def trace_sample(
@@ -89,9 +94,19 @@ def trace_sample(
     settings: ServoSettings,
     device: object,
 ) -> None:
-    """Write the row of a sample; see ``interface``."""
+    """Write the row of a sample; see ``interface``.
+
+    The applied force is the one that acts from this sample on, commanded a delay ago.
+    """
     rows = trace.rows
-    row = trace.status[ROW_COUNT] % rows.shape[0]
+    pending = trace.pending
+    count = trace.status[ROW_COUNT]
+    row = count % rows.shape[0]
+    newest = count % pending.shape[0]
+    oldest = (count + 1) % pending.shape[0]
+    pending[newest, 0] = force.fx
+    pending[newest, 1] = force.fy
+    pending[newest, 2] = force.fz
     rows[row, 0] = sample * settings.period
     rows[row, 1] = reading.x
     rows[row, 2] = reading.y
@@ -99,9 +114,8 @@ def trace_sample(
     rows[row, 4] = servo.fx
     rows[row, 5] = servo.fy
     rows[row, 6] = servo.fz
-    rows[row, 7] = force.fx
-    rows[row, 8] = force.fy
-    rows[row, 9] = force.fz
+    for i in range(3):
+        rows[row, APPLIED + i] = pending[oldest, i]
     rows[row, 10] = force.ramp
     rows[row, 11] = force.energy
     rows[row, 12] = force.damping

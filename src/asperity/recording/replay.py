@@ -147,6 +147,20 @@ def rounded_step(recording: Recording) -> float:
         return 0.0
 
 
+def omitted_delay(recording: Recording) -> int:
+    """Return by how many samples the columns ``applied`` and ``supplied`` ignore the delay.
+
+    Real-time loops of early versions recorded the force before the delay, and its work.
+    """
+    about = recording.metadata
+    if about.get("made_by") != "run" or about.get("has_applied_delay"):
+        return 0
+    try:
+        return min(int(about["servo"]["delay"]), recording.rows)
+    except (KeyError, TypeError, ValueError):
+        return 0
+
+
 @lru_cache(maxsize=1)  # the page and the data of one recording state it
 def recorded_limits(recording: Recording) -> LimitCounts | None:
     """Return how many rows of a recording are at the force limit and below ``max_depth``.

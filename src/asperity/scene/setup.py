@@ -146,9 +146,11 @@ class Setup:
         return replace(self, servo=replace(self.servo, delay=delay))
 
     def on_real_device(self) -> Setup:
-        """Return the same loop without delay and steps: a real device has its own."""
-        servo = replace(self.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
-        return replace(self, servo=servo)
+        """Return the same loop without steps, which a real device has of its own.
+
+        The delay stays: the loop adds none, and counts the work of forces when they act.
+        """
+        return replace(self, servo=self.servo.without_steps())
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""

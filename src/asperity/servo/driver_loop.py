@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from asperity.contacts.warm_start import BUDGET, POINT_COUNT, UNLIMITED, new_warm_start
 from asperity.core.checks import FloatArray
 from asperity.core.platform.clock_interface import Clock
@@ -110,7 +112,8 @@ class DriverLoop:
 
     Args:
         driver: the device; the caller opens and closes it.
-        servo: period, steps of position and force, maximum force, virtual damping.
+        servo: period, steps of position and force, maximum force, virtual damping, and the delay
+            with which the device applies forces.
         safety: limits.
         reach: reach of the handle from the origin of the device [m].
         block: memory of rows and counts.
@@ -133,7 +136,7 @@ class DriverLoop:
         self._safety = safety
         self._reach = reach
         self._frame: FloatArray = driver.frame.matrix
-        self._block = block
+        self._block = block._replace(pending=np.zeros((servo.delay + 1, 3)))
         self._clock = clock
         self._placeholder = driver.placeholder_record()
         self.state = LoopState()

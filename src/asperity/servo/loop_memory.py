@@ -58,12 +58,13 @@ class LoopMemory:
             ) from None
 
     def block(self) -> SharedBlock:
-        """Return the memory as the compiled loop takes it."""
+        """Return the memory as the compiled loop of a device without delay takes it."""
         return SharedBlock(
             np.frombuffer(self._control, np.int64),
             np.frombuffer(self._status, np.int64),
             np.frombuffer(self._table, np.float64).reshape(-1, len(COLUMNS)),
             np.zeros(1, np.int64),
+            np.zeros((1, 3)),
         )
 
     @property

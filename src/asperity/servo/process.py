@@ -396,7 +396,7 @@ class LoopRecorder:
         metadata: Mapping[str, Any],
     ) -> None:
         about: dict[str, Any] = {"made_by": "run", "surface": field_metadata(surface)}
-        about |= {"servo": to_plain_data(servo), "every": 1, **metadata}
+        about |= {"servo": to_plain_data(servo), "every": 1, "has_applied_delay": True, **metadata}
         self._what = path, COLUMNS, about, field_attachments(surface), "record"
         self._loop = loop
         self._next_row = 0

@@ -11,7 +11,7 @@ from asperity.core.files import json_text, text_digest, write_bytes
 from asperity.core.units import count_text, format_quantity
 from asperity.devices import Device
 from asperity.recording.recording import Recording
-from asperity.recording.replay import Replay, rounded_step
+from asperity.recording.replay import Replay, omitted_delay, rounded_step
 from asperity.report.document.html import render_page
 from asperity.report.document.page import (
     PAPER_CITATION,
@@ -192,6 +192,8 @@ def recording_facts(recording: Recording) -> list[tuple[str, str]]:
     if step and "supplied" in recording.names:
         steps = format_quantity(step, "m")
         rows += [("Supplied", f"energy to the hand, as measured in encoder steps of {steps}")]
+    if omitted_delay(recording):
+        rows += [("Applied, supplied", "of the force before the delay, by an early version")]
     return rows
 
 
