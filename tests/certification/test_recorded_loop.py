@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -161,6 +162,15 @@ def test_force_before_the_delay_of_an_early_recording_is_shifted(
     assert (samples.measured_energy is None) == is_early
     facts = dict(recording_facts(open_recording(path)))
     assert ("Applied, supplied" in facts) == is_early
+
+
+def test_oscillation_of_a_hand_that_a_recording_moves_is_no_limit_cycle() -> None:
+    cycle = make_samples(-1e-3 + 2e-4 * np.sin(0.25 * np.arange(8000)), lag=2)
+    text = recording_answer(certify_recording(cycle))
+    assert "A limit cycle along z" in text
+    text = recording_answer(certify_recording(replace(cycle, is_moved=True)))
+    assert "An oscillation of a moved hand along z" in text
+    assert "cycle" not in text
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,7 @@ class RecordedSamples:
             known.
         position_resolution: step to which the loop rounded positions that are recorded exactly [m].
         measured_energy: work on the hand that the loop measured in such steps [J], or ``None``.
+        is_moved: whether the hand followed a prescribed motion.
     """
 
     name: str
@@ -57,6 +58,7 @@ class RecordedSamples:
     limits: LimitCounts | None = None
     position_resolution: float = 0.0
     measured_energy: float | None = None
+    is_moved: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,12 +70,14 @@ class LimitCycle(Serializable):
         frequency: [Hz].
         amplitude: of the position [m].
         since: time after which it does not end any more [s].
+        is_moved: whether the hand followed a prescribed motion, which may be the oscillation.
     """
 
     axis: str
     frequency: float
     amplitude: float
     since: float
+    is_moved: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,11 +182,13 @@ def _read_rows(path: Path) -> RecordedSamples:
     if resolution and not early and "supplied" in names and len(rows):
         supplied = names.index("supplied")
         measured_energy = float(rows[-1, supplied] - rows[0, supplied])
+    motion = recording.metadata.get("motion")
     return replace(
         _named_samples(path, table),
         limits=recorded_limits(recording),
         position_resolution=resolution,
         measured_energy=measured_energy,
+        is_moved=isinstance(motion, dict) and motion.get("kind") != "still",
     )
 
 
@@ -330,5 +336,6 @@ def _find_limit_cycle(
             quiet = np.flatnonzero(np.array(amplitudes) < 0.5 * amplitude)
             first = int(quiet[-1]) + 1 if len(quiet) else 0
             since = float(samples.times[windows[first][0]])
-            cycles.append(LimitCycle(_AXES[axis], float(frequency[peak]), amplitude, since))
+            place = _AXES[axis], float(frequency[peak]), amplitude, since
+            cycles.append(LimitCycle(*place, samples.is_moved))
     return max(cycles, key=lambda cycle: cycle.amplitude, default=None)

@@ -107,7 +107,7 @@ class Setup:
         """Return the metadata of a recording of this loop.
 
         Args:
-            driver: name of the driver in real time; the simulated one adds plant and hand.
+            driver: name of the driver in real time; the simulated one adds plant, hand and motion.
         """
         device = self.device
         metadata = attributes_to_dict(self, "duration", "start", "velocity", "assumptions")
@@ -118,7 +118,7 @@ class Setup:
         if driver:
             metadata["driver"] = driver
         if driver == SIMULATED_DRIVER:
-            metadata |= attributes_to_dict(self, "plant", "hand")
+            metadata |= attributes_to_dict(self, "plant", "hand", "motion")
         return metadata
 
     def file_hashes(self) -> dict[str, str]:

@@ -140,9 +140,8 @@ def recording_answer(result: RecordedCertification) -> str:
         frequency = format_quantity(cycle.frequency, "Hz", digits=3)
         amplitude = format_quantity(cycle.amplitude, "m", digits=3)
         since = format_quantity(cycle.since, "s", digits=3)
-        sentences.append(
-            f"A limit cycle along {cycle.axis}: {frequency}, {amplitude}, from {since}."
-        )
+        kind = "An oscillation of a moved hand" if cycle.is_moved else "A limit cycle"
+        sentences.append(f"{kind} along {cycle.axis}: {frequency}, {amplitude}, from {since}.")
     if result.late_samples:
         count = result.late_samples
         sentences.append(f"Late samples: {count}, which lack {result.missing_samples} more.")
