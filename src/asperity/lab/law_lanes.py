@@ -58,17 +58,19 @@ class SecondLane(LawLane):
     Args:
         leader: session of the first lane.
         pictures: of the surface.
-
-    Attributes:
-        law: letter of the law; empty for none.
     """
 
     def __init__(self, leader: Session, pictures: BackgroundRenderer) -> None:
         super().__init__(Session(leader.scene_state, leader.on_change, leader=leader), pictures)
         # Scene and start of the first loop, and law, that were requested last.
         self._leader = leader
-        self.law = ""
+        self._chosen_law = ""
         self._followed = (0, 0, "")
+
+    @property
+    def law(self) -> str:
+        """Letter of the law; empty for none, and during the guided tour."""
+        return "" if self._leader.is_in_tour else self._chosen_law
 
     def choose(self, letter: str) -> None:
         """Render a law, by its letter, or none.
@@ -78,7 +80,7 @@ class SecondLane(LawLane):
         """
         if self._leader.handle is not None:
             raise ParameterError(BESIDE, "needs the simulated device: one handle has one law")
-        self.law = find_law(letter).letter if letter else ""
+        self._chosen_law = find_law(letter).letter if letter else ""
         self._followed = (0, 0, "")
         if not letter:
             self.session.release_force("", now=True)
@@ -87,14 +89,18 @@ class SecondLane(LawLane):
         """Follow the first loop, and show the pictures of what is rendered."""
         leader = self._leader
         session = self.session
-        wanted = id(leader.scene_state), leader.start_count, self.law
-        if self.law and leader.state == "running" and wanted != self._followed:
+        law = self.law
+        wanted = id(leader.scene_state), leader.start_count, law
+        if not law and (self._followed[2] or session.is_running):  # the tour begins
+            self._followed = (0, 0, "")
+            session.release_force("", now=True)
+        if law and leader.state == "running" and wanted != self._followed:
             if wanted[1] != self._followed[1]:
                 session.release_force("", now=True)  # its samples count from zero again
             self._followed = wanted
             session.saved_scenes.scenes[BESIDE] = leader.scene_state
-            session.change({SCENE_KEY: BESIDE, "law": self.law})
-        if self.law and session.state == "running":
+            session.change({SCENE_KEY: BESIDE, "law": law})
+        if law and session.state == "running":
             scene = session.scene_state
             self.pictures.show(scene.setup.rendered, scene.rated_device)
 

@@ -194,6 +194,11 @@ class Session:
         return self._loop is None and self._active_shared is None
 
     @property
+    def is_in_tour(self) -> bool:
+        """Whether the scene is one of the guided tour."""
+        return PREVIOUS_SCENE in self.saved_scenes.scenes
+
+    @property
     def steering_progress(self) -> dict[str, int]:
         """Numbers of the newest request for the hand, and of the newest acknowledged one."""
         hand = self.pointer_hand
@@ -225,7 +230,7 @@ class Session:
             queue = self._requests.queue
             changes = [change for change in queue if isinstance(change, Mapping)]
             names = {change.get(SCENE_KEY) for change in changes}
-            is_running = PREVIOUS_SCENE in self.saved_scenes.scenes or TOUR_SCENE in names
+            is_running = self.is_in_tour or TOUR_SCENE in names
             for change in changes if is_running else ():
                 queue.remove(change)
         if is_running:

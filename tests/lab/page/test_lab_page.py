@@ -11,6 +11,7 @@ from tests.lab.browser import Browser, needs_browser
 from tests.lab.started import Started
 
 from asperity.lab.access import page_files
+from asperity.lab.scene_state import RANGES
 
 MOST_BYTES = 1_000_000
 # One question: between two of them the meter may begin again.
@@ -180,6 +181,10 @@ def test_friction_takes_energy_and_its_anchor_is_drawn(page: Browser) -> None:
     page.ask("lab.connection.send('change', { changes: { law: 'H' } })")
     page.until("lab.status.settings.law === 'H' && lab.status.state === 'running'")
     assert page.ask("document.getElementById('taken').hidden")
+    limits = page.ask(
+        "['min', 'max'].map(end => +document.getElementById('friction-coefficient')[end])"
+    )
+    assert tuple(limits) == RANGES["friction"]
     page.ask(f"{slide}(0.4)")
     page.until("lab.status.friction && lab.status.state === 'running'")
     page.until("!document.getElementById('taken').hidden")

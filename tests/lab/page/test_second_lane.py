@@ -145,11 +145,26 @@ def test_the_tour_shows_one_law(page: Browser) -> None:
     page.until(f"lab.tour.isActive && lab.status.start_count > {starts}")
     page.until("!lab.secondLane.isShown && lab.status.settings.beside === ''")
     page.until("/guided tour/.test(document.getElementById('beside-note').innerText)")
+    page.until("lab.status.beside.state === 'stopped'")
     page.press("2")
     page.press("t")
     page.until(f"!lab.tour.isActive && lab.status.start_count === {starts} + 2")
-    assert page.ask("lab.status.settings.beside") == ""
+    # The second law is that of before, in the address, too.
+    page.until(f"lab.secondLane.status?.settings.law === 'H' && {BOTH}")
+    page.until("location.hash.includes('beside=H')")
     assert page.said == []
+
+
+@needs_browser
+def test_a_tour_that_ends_with_its_page_restores_the_second_law(page: Browser) -> None:
+    address = page.ask("location.href.split('#')[0]")
+    page.press("t")
+    page.until("lab.tour.isActive && lab.status.settings.texture.includes('0.4mm')")
+    page.until("lab.status.settings.beside === '' && lab.status.state === 'running'")
+    page.call("Page.navigate", url="about:blank")
+    page.call("Page.navigate", url=f"{address}?again")  # whose address holds no settings
+    page.until(f"globalThis.lab?.status?.has_control && {BOTH}")
+    assert page.ask("lab.secondLane.status.settings.law") == "H"
 
 
 @needs_browser

@@ -37,7 +37,7 @@ function keyActions(host) {
     PageDown: () => { hand.z = Math.max(hand.height - host.viewWidth / 80, -MAX_KEY_HEIGHT); hand.requestMotion(); },
     m: () => handle.isPresent || host.motionPanel.choose(hand.nextMotion),
     2: () => handle.isPresent || host.secondLane.toggle(), x: () => $("swap-laws").click(), r: () => $("reset-energy").click(), s: () => $("sound").click(),
-    t: () => handle.isPresent || host.tourPanel.toggle(), v: () => tour.isActive && $("tour-demo").click(),
+    t: () => handle.isPresent || $("tour-start").click(), v: () => tour.isActive && $("tour-demo").click(),
     n: () => tour.isActive && $("tour-next").click(), p: () => tour.isActive && $("tour-back").click(),
     "+": () => host.zoom(1 / ZOOM_FACTOR), "-": () => host.zoom(ZOOM_FACTOR),
   };
@@ -45,7 +45,7 @@ function keyActions(host) {
 
 /**
  * Obey the keys.
- * @param host object with hand, handle, tour, tourPanel, motionPanel, secondLane, viewWidth [m], hasControl and zoom(factor)
+ * @param host object with hand, handle, tour, motionPanel, secondLane, viewWidth [m], hasControl and zoom(factor)
  */
 export function obeyKeys(host) {
   const { hand } = host, actions = keyActions(host);

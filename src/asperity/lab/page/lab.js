@@ -82,6 +82,7 @@ const connection = new Connection({
     isFirstStatus = false;
     status = null;
     tour.end(); // the server ends it, too
+    $("tour-start").disabled = true;
     for (const one of [pictures, secondLane]) one.setStatus(null);
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
@@ -345,7 +346,7 @@ function updateTexts({ probe, force, energy, isInside }) {
 function zoom(factor) { viewWidth = Math.max(MIN_VIEW_WIDTH, Math.min(MAX_VIEW_WIDTH, viewWidth * factor)); }
 
 const inputHost = {
-  hand, handle, tour, tourPanel, motionPanel, secondLane, zoom,
+  hand, handle, tour, motionPanel, secondLane, zoom,
   get viewWidth() { return viewWidth; }, get hasControl() { return Boolean(status?.has_control); },
   get canFollowPointer() { return Boolean(relief.heights) && !handle.isPresent; },
 };

@@ -167,7 +167,7 @@ export class Tour {
     host.viewWidth = TOUR_VIEW_WIDTH;
     // The server saves the current scene, and builds that of the tour whatever the hand was.
     this.initialStartCount = host.status.start_count;
-    host.changeScene({ saved_scene: "tour", beside: "", ...TOUR_SETTINGS });
+    host.changeScene({ saved_scene: "tour", ...TOUR_SETTINGS });
     this.goTo(0);
   }
 
