@@ -25,7 +25,7 @@ from asperity.recording.replay import (
 )
 from asperity.recording.row_encoding import row_type
 from asperity.recording.writer import RecordingWriter
-from asperity.report.sentences.loop_text import recording_answer
+from asperity.report.sentences.loop_text import recording_answer, replay_answer
 from asperity.simulation import Cartesian, Servo, SpringHand, Strokes, simulate
 from asperity.simulation.trace import COLUMNS
 
@@ -113,6 +113,28 @@ def test_truncated_file_replays_to_its_end(tmp_path: Path) -> None:
     result = asp.replay(open_recording(path))
     assert result.is_identical
     assert 4096 <= result.rows < 20_000
+
+
+@pytest.mark.parametrize("row", [1, 5017, 2 * 4096])
+def test_replay_ends_before_the_first_missing_sample(tmp_path: Path, row: int) -> None:
+    whole = make_recording(tmp_path / "whole.mcap")
+    rows = np.delete(np.concatenate([*whole.blocks()]), [row, 9000], axis=0)
+    path = tmp_path / "run.mcap"
+    attachments = {replay.TEXTURE_FILE: whole.attachment(replay.TEXTURE_FILE)}
+    with asp.RecordingWriter(path, whole.columns, whole.metadata, attachments) as writer:  # type: ignore[arg-type]  # bytes
+        writer.append(rows)
+    result = asp.replay(path)
+    assert (result.is_identical, result.rows, result.recorded_rows) == (True, row, 19_998)
+    assert result.missing_before == pytest.approx((row + 1) * SERVO.period)
+    assert result.to_dict()["missing_before"] == result.missing_before
+    assert repr(result).startswith(f"<Replay of {row} of 19998 rows, up to a missing sample, ")
+    words = replay_answer(result)
+    assert words.startswith(f"All {row} rows before the first missing sample are reproduced")
+    assert f"Samples are missing before row {row} of 19998, at " in words
+    with asp.RecordingWriter(path, whole.columns, whole.metadata, attachments) as writer:  # type: ignore[arg-type]  # bytes
+        writer.append(rows[row:])
+    with pytest.raises(ParameterError, match="samples are missing before its first row, at "):
+        asp.replay(path)
 
 
 def change_value(path: Path, row: int, column: int, value: float) -> None:

@@ -81,6 +81,9 @@ class Replay(Serializable, Displayable):
         max_force_difference: largest difference of a component of the force [N].
         notes: changes since the recording, in sentences.
         limits: rows at the force limit and below ``max_depth``, see :func:`recorded_limits`.
+        recorded_rows: number of rows of the recording.
+        missing_before: time of the row before which samples are missing [s]: the replay ends there,
+            as the state of the loop is not known; ``None`` if none are missing.
     """
 
     path: str
@@ -90,14 +93,19 @@ class Replay(Serializable, Displayable):
     max_force_difference: float
     notes: tuple[str, ...] = ()
     limits: LimitCounts | None = None
+    recorded_rows: int = 0
+    missing_before: float | None = None
 
     def __repr__(self) -> str:
         result = "the same bit for bit" if self.is_identical else f"{self.differing_rows} differ"
-        return f"<Replay of {self.rows} rows, {result}>"
+        rows = f"{self.rows} rows"
+        if self.missing_before is not None:
+            rows = f"{self.rows} of {self.recorded_rows} rows, up to a missing sample"
+        return f"<Replay of {rows}, {result}>"
 
     @property
     def is_identical(self) -> bool:
-        """Whether every row is the same, bit for bit."""
+        """Whether every computed row is the same, bit for bit."""
         return self.differing_rows == 0
 
 
@@ -106,6 +114,7 @@ def replay(recording: Recording | str | os.PathLike[str], surface: Surface | Non
 
     The servo's tick is computed for each position: steps of the encoder, law, virtual damping,
     limit and steps of the force, with the law's and the servo's state carried from the first row.
+    The replay ends before the first missing sample, see ``missing_before`` of the result.
 
     Args:
         recording: a recording with every sample of a loop, or its path.
@@ -130,10 +139,17 @@ def replay(recording: Recording | str | os.PathLike[str], surface: Surface | Non
             note = f"Recorded on another surface: content {content}, this is {surface.digest}."
             notes.append(note)
     notes = [*describe_changes(recording, field.law), *notes]
-    result = Replay(str(recording.path), 0, 0, None, 0.0, tuple(notes), recorded_limits(recording))
+    limits = recorded_limits(recording)
+    result = Replay(str(recording.path), 0, 0, None, 0.0, tuple(notes), limits, recording.rows)
     for first, block, forces in _replay_blocks(recording, field, settings):
         result = _compare(result, first, block, forces)
-    return result
+    if result.rows == recording.rows:
+        return result
+    time = float(recording[recording.names[0]][result.rows])
+    if not result.rows:
+        reason = f"samples are missing before its first row, at {time:g} s"
+        raise ParameterError("recording", f"cannot be replayed: {reason}")
+    return replace(result, missing_before=time)
 
 
 def rounded_step(recording: Recording) -> float:
@@ -251,7 +267,10 @@ def _servo_settings(metadata: Mapping[str, Any]) -> ServoSettings:
 def _replay_blocks(
     recording: Recording, field: RecordedField, settings: ServoSettings
 ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-    """Yield number of the first row, time and recorded columns, and the same computed again."""
+    """Yield number of the first row, time and recorded columns, and the same computed again.
+
+    The rows end where samples are missing.
+    """
     names = recording.names
     compared_names = list(COMPARED_COLUMNS)
     if COMPARED_COLUMNS[-1] not in names:  # recorded before closed bodies had friction
@@ -268,8 +287,8 @@ def _replay_blocks(
     state = LoopState()
     first = 0
     memory = new_warm_start(field.law.contact.max_evaluations)
-    for block in recording.blocks():
-        _check_times(block[:, 0], first, settings.period)
+    for recorded in recording.blocks():
+        block = recorded[: _count_consecutive(recorded[:, 0], first, settings.period)]
         points = np.ascontiguousarray(block[:, point])
         out = np.empty((len(block), len(COMPARED_COLUMNS)))
         device = ReplayedDevice(points, np.zeros(1, np.int64))
@@ -286,16 +305,15 @@ def _replay_blocks(
             field.law_arguments,
         )
         yield first, block[:, compared], np.ascontiguousarray(out[:, : len(compared_names)])
+        if len(block) < len(recorded):
+            return
         first += len(block)
 
 
-def _check_times(times: FloatArray, first: int, period: float) -> None:
-    """Refuse rows that are not the samples of a loop, one after the other."""
-    wrong = np.flatnonzero(np.abs(times / period - np.arange(first, first + len(times))) > 0.5)
-    if len(wrong):
-        row = first + int(wrong[0])
-        reason = f"samples are missing before row {row}, at {times[wrong[0]]:g} s"
-        raise ParameterError("recording", f"cannot be replayed: {reason}")
+def _count_consecutive(times: FloatArray, first: int, period: float) -> int:
+    """Return how many rows from the first on are samples of a loop, one after the other."""
+    wrong = np.abs(times / period - np.arange(first, first + len(times))) > 0.5
+    return int(np.append(np.flatnonzero(wrong), len(times))[0])
 
 
 def _compare(result: Replay, first: int, block: FloatArray, replayed: FloatArray) -> Replay:

@@ -175,12 +175,19 @@ def _are_positive_numbers(*values: Any) -> bool:
 
 
 def replay_answer(replay: Replay) -> str:
-    """Return the result of a replay in one or two sentences."""
+    """Return the result of a replay in some sentences."""
+    which = "rows"
+    end = ""
+    if replay.missing_before is not None:
+        which = "rows before the first missing sample"
+        time = format_quantity(replay.missing_before, "s")
+        row = f"row {replay.rows} of {replay.recorded_rows}, at {time}"
+        end = f" Samples are missing before {row}: the replay ends there."
     if replay.first_difference is None:
-        texts = [f"All {replay.rows} rows are reproduced bit for bit"]
+        texts = [f"All {replay.rows} {which} are reproduced bit for bit"]
         if replay.limits is not None:
             texts += limit_texts(replay.limits, replay.limits.max_depth)
-        return f"{'. '.join(texts)}."
+        return f"{'. '.join(texts)}.{end}"
     first = replay.first_difference
     unit = ""
     if first.column.startswith("commanded"):
@@ -191,8 +198,8 @@ def replay_answer(replay: Replay) -> str:
     where = f"row {first.row}, at {format_quantity(first.time, 's')}"
     difference = f"the first is {where}: {first.column} is {values}{unit}"
     largest = format_quantity(replay.max_force_difference, "N", digits=3)
-    count = f"{replay.differing_rows} of {replay.rows} rows differ"
-    return f"{count}; {difference}. The largest difference of a force is {largest}."
+    count = f"{replay.differing_rows} of {replay.rows} {which} differ"
+    return f"{count}; {difference}. The largest difference of a force is {largest}.{end}"
 
 
 def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
