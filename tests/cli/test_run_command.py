@@ -266,11 +266,19 @@ def test_stiffness_above_the_limit_is_refused(call: Call, scene: Callable[..., s
     assert (code, json.loads(out)["ended"]) == (0, "finished")
 
 
-def test_fault_gives_one_line_and_exit_code_3(call: Call, scene: Callable[..., str]) -> None:
+def test_fault_gives_exit_code_3_and_what_is_known_of_the_run(
+    call: Call, scene: Callable[..., str], tmp_path: Path
+) -> None:
     path = scene('max_depth = "3 mm"', 'max_depth = "0.2 mm"\nclamp = "none"')
-    code, out, err = call(path, "--duration", "5s")
+    record = tmp_path / "run.mcap"
+    code, out, err = call(path, "--duration", "5s", "--record", str(record))
     assert (code, out) == (3, "")
-    last = err.splitlines()[-1]
+    *_notes, late, delay, _period, recorded, last = err.splitlines()
+    counts = re.match(r"asperity: Late: \d+ of (\d+) samples finished .*, \d+ skipped$", late)
+    assert counts is not None
+    assert int(counts[1]) == open_recording(record).rows > 0
+    assert re.match("asperity: Start delay: .*, worst [0-9]", delay)
+    assert recorded == f"asperity: Recording: {record} holds the samples until then"
     assert last.startswith("asperity: the probe is deeper than max_depth")
     assert "the force was made zero" in last
 

@@ -78,6 +78,7 @@ def run_command(
     with progress_bar("analyzing the surface"):
         check_stiffness_limit(setup, accept_risk=accept_risk)
     from asperity.report.pages.run_report import device_run_page
+    from asperity.servo.loop_memory import DeviceFault
 
     loop = make_loop(setup, driver, duration, process)
     with stop_on_signals(loop.memory) as signals:
@@ -87,6 +88,9 @@ def run_command(
             with record_loop(record, loop, setup) as write_rows:
                 reason = watch_loop(loop, signals, write_rows)
                 loop.stop()
+        except DeviceFault:
+            print_fault_summary(loop, record)
+            raise
         finally:
             loop.stop()
     suspend_if_requested(signals)
@@ -163,6 +167,18 @@ def record_loop(path: str | None, loop: ServoProcess, setup: Setup) -> Iterator[
         yield recorder.write_new_rows
     if lost := recorder.lost_rows:
         print_message(f"{lost} rows are missing in the recording: this program was too slow")
+
+
+def print_fault_summary(loop: ServoProcess, path: str | None) -> None:
+    """Print the timing of a loop that ended by a fault, and which recording holds its samples."""
+    from asperity.report.sentences.loop_text import timing_lines
+
+    if not loop.statistics.samples:
+        return
+    for line in timing_lines(loop.statistics):
+        print_message(line)
+    if path is not None:
+        print_message(f"Recording: {path} holds the samples until then")
 
 
 def watch_loop(loop: ServoProcess, signals: list[int], write_rows: Callable[[], None]) -> EndReason:
