@@ -6,6 +6,8 @@ import math
 import os
 import resource
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,7 +23,7 @@ from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.process import PrestartedProcess, ServoProcess
 from asperity.servo.safety import Safety, excess_stiffness_reason
-from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, Strokes
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -103,7 +105,8 @@ def test_new_surface_is_checked_before_it_is_rendered(loop: ServoProcess) -> Non
 
 def test_fault_carries_the_last_samples() -> None:
     shallow = SURFACE.to_depth(1.2e-3)
-    driver = simulated_driver(Cartesian(0.05, 1.0), HAND, SERVO, Stationary((0.0, 0.0, -3e-3)), 1.0)
+    descent = Strokes((0.0, 0.0, 4e-3), (0.0, 0.0, -3e-3), speed=0.05)
+    driver = simulated_driver(Cartesian(0.05, 1.0), HAND, SERVO, descent, 1.0)
     with ServoProcess(shallow, driver, SERVO, PATIENT) as loop:
         with pytest.raises(DeviceFault, match="deeper than max_depth") as caught:
             wait_until(lambda: loop.poll() is not EndReason.RUNNING)
@@ -113,7 +116,25 @@ def test_fault_carries_the_last_samples() -> None:
     assert (fault.cause, fault.exit_code) == (EndReason.DEPTH, 3)
     assert fault.samples.shape == (FAULT_SAMPLES, len(COLUMNS))
     assert (fault.samples[-1, 7:10] == 0.0).all()
+    assert (np.diff(fault.samples[:, 0]) > 0.0).all()
     assert fault.samples[-1, 3] < -1.2e-3 < fault.samples[0, 3] + 1e-3
+
+
+@pytest.mark.parametrize("from_input", [False, True])
+def test_script_without_a_main_guard_is_told(tmp_path: Path, from_input: bool) -> None:
+    script = (
+        "import asperity as asp\n"
+        "asp.run('sinusoid:amplitude=20um,period=1mm', law='C', stiffness=50, duration=0.1)\n"
+    )
+    path = tmp_path / "script.py"
+    path.write_text(script)
+    command = [sys.executable, "-" if from_input else str(path)]
+    done = subprocess.run(command, input=script, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert "DeviceFault: the process of the loop ended when it started: a script needs" in last
+    assert "needs  if __name__ == '__main__':" in last
+    assert "is a file" in last
 
 
 def test_killed_loop_process_is_a_fault(loop: ServoProcess) -> None:

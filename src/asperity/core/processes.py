@@ -33,6 +33,11 @@ START_DELAY = 1.0
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """Environment of every process: the last digit of linear algebra depends on its threads."""
 
+MAIN_GUARD_HINT = (
+    "a script needs  if __name__ == '__main__':  around what starts processes, and is a file"
+)
+"""Ends the message about a process that ended before it started."""
+
 REPORT_PERIOD = 0.5
 """Time [s] between two looks at the progress of a worker."""
 PROGRESS_CALLBACKS: list[Callable[[float], None]] = []

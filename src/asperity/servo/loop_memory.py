@@ -95,7 +95,7 @@ class LoopMemory:
         """Return the available rows from a number on, and the number of the first."""
         table = self.block().rows
         count = self.row_count
-        first_row = max(first_row, count - len(table))
+        first_row = max(0, first_row, count - len(table))
         rows = table[np.arange(first_row, count) % len(table)]
         # The row after the newest may be half written: it counts as overwritten.
         lost = max(0, self.row_count + 1 - len(table) - first_row)

@@ -200,8 +200,9 @@ def run_loop_process(connection: Connection, memory: LoopMemory) -> None:
     _leave_to_supervisor(memory)
     importlib.import_module("numba")  # the slowest import, done while the job is prepared
     try:
+        connection.send(("started", None))
         job = unpickle(*connection.recv())
-    except EOFError:
+    except (EOFError, OSError):
         return  # there is no job
     try:
         _LoopServer(connection, memory, job).serve()

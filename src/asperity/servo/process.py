@@ -20,7 +20,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError, ParameterError, print_message
 from asperity.core.files import to_plain_data
 from asperity.core.platform.process_control import resume_process
-from asperity.core.processes import ShieldedContext
+from asperity.core.processes import MAIN_GUARD_HINT, ShieldedContext
 from asperity.devices import Device
 from asperity.loop.interface import NO_END
 from asperity.loop.shared_trace import COLUMNS
@@ -145,6 +145,7 @@ class ServoProcess:
         else:
             self.memory = prestarted.memory
         self.notes: tuple[str, ...] = ()
+        self._has_started = False
         self._end_reason = EndReason.RUNNING
         self._driver_message = ""
         self._last_row_count = 0
@@ -168,7 +169,9 @@ class ServoProcess:
         self.process = self._prestarted.process
         threading.Thread(target=self._send_heartbeats, daemon=True).start()
         try:
-            self._connection.send(_pickle(self._job))
+            job = _pickle(self._job)
+            with suppress(OSError):  # it has ended
+                self._connection.send(job)
             self.notes = self._wait_for("ready", START_TIMEOUT)
         except BaseException:  # also for an interrupt
             self._terminate()
@@ -200,6 +203,8 @@ class ServoProcess:
         reason = self._end_reason
         text = FAULT_DESCRIPTIONS.get(reason, self._driver_message)
         rows, _first = self.memory.rows(self.memory.row_count - FAULT_SAMPLES)
+        if reason is EndReason.DIED and not self._has_started:
+            return DeviceFault(reason, f"{text} when it started: {MAIN_GUARD_HINT}", rows)
         if len(rows):
             text += f" at {rows[-1, 0]:.4g} s"
         if reason in {EndReason.UNRESPONSIVE, EndReason.DIED}:
@@ -319,6 +324,9 @@ class ServoProcess:
         try:
             while self._connection.poll(timeout):
                 kind, content = self._connection.recv()
+                self._has_started = True
+                if kind == "started":
+                    continue
                 if kind == expected:
                     return content
                 if kind in _REFUSALS:

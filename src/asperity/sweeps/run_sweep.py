@@ -23,7 +23,7 @@ from typing import Any
 
 from asperity.core.arguments import check_integer
 from asperity.core.errors import ParameterError
-from asperity.core.processes import available_cores, end_pool, make_pool
+from asperity.core.processes import MAIN_GUARD_HINT, available_cores, end_pool, make_pool
 from asperity.sweeps.case_runs import Case, CaseTemplate, Outcome, compute_cases
 from asperity.sweeps.sweep_plan import SweepPlan, make_plan
 from asperity.sweeps.sweep_result import ResultStore, SweepResult
@@ -196,7 +196,7 @@ def _open_pool(processes: int) -> Iterator[Executor]:
         try:
             pool.submit(int).result()
         except BrokenExecutor:
-            reason = "end when they start: a script needs  if __name__ == '__main__':  around sweep"
+            reason = f"end when they start: {MAIN_GUARD_HINT}"
             raise ParameterError("processes", reason) from None
         yield pool
         pool.shutdown()
