@@ -79,7 +79,7 @@ def test_step_states_size_and_slopes_of_the_form() -> None:
     prepared = prepare(RawSurface(bow, (px, py), "bow", ()), form=2)
     assert np.max(np.abs(prepared.heights)) < 1e-18
     rms, span = np.nanstd(bow) * 1e9, (np.nanmax(bow) - np.nanmin(bow)) * 1e6
-    assert prepared.steps[1] == (
+    assert prepared.steps[0] == (
         "form removed: subtracted the least-squares polynomial of degree 2, its RMS"
         f" {rms:.4g} nm, peak to valley {span:.4g} µm, slopes in the middle 0.02 and -0.004"
     )
@@ -90,7 +90,7 @@ def test_degree_zero_keeps_the_tilt() -> None:
     prepared = prepare(RawSurface(ramp, (1e-5,), "ramp", ()), form=0, s_cutoff=2e-5)
     assert np.ptp(prepared.heights) > 0.9e-4
     assert abs(prepared.heights.mean()) < 1e-18
-    assert prepared.steps[1] == "mean height 50 µm subtracted; not levelled"
+    assert prepared.steps[0] == "mean height 50 µm subtracted; not levelled"
 
 
 @pytest.mark.parametrize("degree", [-1, 11, 1.5, np.nan, np.inf, True, "2"])

@@ -55,12 +55,27 @@ def with_holes(heights: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_step_states_the_number_of_missing_points() -> None:
     heights = bumpy(20, 30)
     heights.ravel()[[33, 34, 70, 71, 72, 73, 74, 200, 300, 400, 500, 501]] = np.nan
-    steps = prepare(surface(heights)).steps
+    result = prepare(surface(heights))
+    steps = result.steps
     assert (
-        steps[0]
+        steps[1]
         == "filled 12 of 600 missing points (2 %) by harmonic interpolation on the fitted tilt"
     )
-    assert prepare(surface(bumpy())).steps[0] == "no missing points"
+    assert prepare(surface(bumpy())).steps[1] == "no missing points"
+
+
+def test_steps_are_in_the_order_of_the_rows() -> None:
+    heights = bumpy(20, 30)
+    heights[4:6, 4:6] = np.nan
+    result = prepare(surface(heights), magnify=2.0, on_stage=lambda *_stage: None)
+    assert [step.split()[0].rstrip(":") for step in result.steps] == [
+        "levelled",
+        "filled",
+        "filtered",
+        "magnified",
+    ]
+    names = [stage.name.split()[0] for stage in result.history]
+    assert names == ["as", "levelled", "holes", "S-filter", "magnified"]
 
 
 # --- levelling -------------------------------------------------------------------------------
@@ -69,7 +84,7 @@ def test_step_states_the_number_of_missing_points() -> None:
 def test_levelling_removes_a_plane_and_states_its_slopes() -> None:
     prepared = prepare(surface(plane(30, 40)))
     assert np.max(np.abs(prepared.heights)) < 1e-14 * 3e-6 * 1e3
-    assert "least-squares plane, slopes 0.02 and -0.005" in prepared.steps[1]
+    assert "least-squares plane, slopes 0.02 and -0.005" in prepared.steps[0]
 
 
 def test_levelling_fits_the_valid_points_only() -> None:
@@ -107,7 +122,7 @@ def test_levelling_of_a_profile() -> None:
     x = np.arange(50.0)
     prepared = prepare(surface(1e-6 + 0.3 * P * x))
     assert np.max(np.abs(prepared.heights)) < 1e-18
-    assert prepared.steps[1] == "levelled: subtracted the least-squares line, slope 0.3"
+    assert prepared.steps[0] == "levelled: subtracted the least-squares line, slope 0.3"
 
 
 # --- filtering -------------------------------------------------------------------------------

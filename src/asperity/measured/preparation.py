@@ -199,8 +199,8 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         >>> raw = RawSurface(1e-6 * np.cos(8 * np.pi * x) + 3.2e-6 * x, (1e-5,), "wave", ())
         >>> for step in prepare(raw, magnify=20).steps:
         ...     print(step)
-        no missing points
         levelled: subtracted the least-squares line, slope 0.01
+        no missing points
         filtered: Gaussian ISO 16610-21, cut-off 40 µm (chosen from the sampling: 4 samples)
         magnified 20 times laterally and in height
     """
@@ -223,12 +223,12 @@ def prepare(  # noqa: D417 - the others are described by their declarations
         form = 0
     sentence = subtract_form(heights, fit_form(heights, form), lateral)
     record(_FORM_STAGE_NAMES.get(form, "form removed"), heights, lateral, removes=True)
+    steps.append(sentence)
     start("fill")
     # The residual is interpolated, so that a hole at the border continues a bow or a tilt.
     filled = _fill_missing(heights, lateral, form, steps)
     if filled.any():
         record("holes filled", heights, lateral)
-    steps.append(sentence)
     start("filter")
     steps.extend(apply_filters(heights, lateral, cutoffs, record, periodic=repeats))
     start("tip")

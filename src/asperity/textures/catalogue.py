@@ -110,7 +110,7 @@ def load_texture(  # noqa: D417 - the others are described where they are declar
 ) -> Texture:
     """Load a measured surface as a texture.
 
-    Reads the file and prepares it: remove outliers, fill missing points, level, Gaussian band
+    Reads the file and prepares it: remove outliers, level, fill missing points, Gaussian band
     limit, stylus tip, periodic continuation, magnify. The ``preparation`` of the result lists the
     steps. A file written by ``asperity prepare`` is used as it is, and so is a baked field.
 
