@@ -115,7 +115,7 @@ BAD_FILES = {
     "unknown.toml": ("max_stifness = 3", "did you mean 'max_stiffness'"),
     "dimension.toml": ('max_stiffness = "3 N"', "another dimension"),
     "contradiction.toml": ('[max_force]\nvalue = "12 N"\nunit = "mm"', "is of another dimension"),
-    "factor.toml": ('[max_stiffness]\nvalue = "5 N/mm"\nunit = "N/m"', "must be a number"),
+    "factor.toml": ('[max_stiffness]\nvalue = "5 N/mm"\nunit = "N/m"', "has its unit twice"),
     "damping.toml": ("damping = 0", "must be positive"),
     "negative.toml": ("damping = '-1 N*s/m'", "must be positive"),
     "bare.toml": ("damping = 1", "damping needs a unit: write 1N*s/m"),

@@ -200,7 +200,7 @@ def test_device_value_with_two_units_is_refused(call: Call, tmp_path: Path) -> N
     path.write_text('[max_stiffness]\nvalue = "5 N/mm"\nunit = "N/m"\n')
     code, out, err = call(SPEC, "--device", str(path))
     assert (code, out) == (2, "")
-    assert "device.max_stiffness must be a number, got '5 N/mm'" in err
+    assert "device.max_stiffness has its unit twice, in '5 N/mm' and in unit = 'N/m': remove" in err
 
 
 def test_flat_map_is_reported_as_having_no_texture(call: Call, tmp_path: Path) -> None:

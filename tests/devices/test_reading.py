@@ -76,7 +76,7 @@ def test_valid_values_are_parsed(content: dict[str, object], field: str, value: 
     ],
 )
 def test_unit_in_value_and_field_is_an_error(field: str, value: str, unit: str) -> None:
-    with pytest.raises(ParameterError, match=f"device.{field} must be a number, got '{value}'"):
+    with pytest.raises(ParameterError, match=f"device.{field} has its unit twice, in .{value}."):
         parse_device({field: {"value": value, "unit": unit}}, "mine")
 
 

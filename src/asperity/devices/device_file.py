@@ -256,7 +256,11 @@ def _append_unit(name: str, value: Any, unit_name: Any, unit: str) -> Any:
     if not isinstance(unit_name, str) or not unit_name.strip() or _NUMBER.fullmatch(unit_name):
         raise ParameterError(f"{name}.unit", f"must be text such as '{unit}'", unit_name)
     parse_quantity(f"{name}.unit", f"1 {unit_name}", unit)
-    parse_quantity(name, value, "")  # a plain number: its unit is given once
+    if isinstance(value, str) and not _NUMBER.fullmatch(value):
+        parse_quantity(name, value, unit)
+        twice = f"has its unit twice, in {value!r} and in unit = {unit_name!r}: remove one"
+        raise ParameterError(name, twice)
+    parse_quantity(name, value, "")
     return f"{value} {unit_name}"
 
 

@@ -432,3 +432,11 @@ def test_compare_analyze_and_limits_agree_on_random_surfaces(seed: int) -> None:
     stiffness = float(10.0 ** rng.uniform(1.0, 3.7))
     depth = texture.peak_to_valley * float(rng.uniform(0.2, 1.0))
     checked_passivity(texture, "CHADCHEG"[seed], device, stiffness, depth)
+
+
+@pytest.mark.parametrize(("delay", "count"), [(1, "1 sample"), (2, "2 samples")])
+def test_assumptions_name_a_delay_that_the_wall_test_did_not_have(delay: int, count: str) -> None:
+    device = parse_device({"max_stiffness": 1800.0, "delay_samples": delay}, "mine")
+    sentences = compare(WAVE, device, "W").assumptions
+    wall = f"{1800.0 * 0.5 / (0.5 + delay):g} N/m"
+    assert f"A delay of {count}, 0 in the test of K₀, allows a wall of {wall}" in sentences

@@ -13,7 +13,7 @@ from asperity.analysis.results.analyze import PASSIVITY_FIELDS, Analysis, surfac
 from asperity.analysis.results.check_limits import Limits
 from asperity.analysis.results.compare import Comparison
 from asperity.core.arguments import DEFAULT_STIFFNESS
-from asperity.core.units import format_quantity, format_stiffness
+from asperity.core.units import count_text, format_quantity, format_stiffness
 from asperity.devices import Device
 from asperity.envelopes.envelope import GENTLE_WAVE, Envelope
 from asperity.laws.f_friction_modulation import LAW as F
@@ -248,8 +248,8 @@ def _rate_sentences(comparison: Comparison) -> list[str]:
         sentences.append(f"A slower loop than that of K₀ is allowed less in proportion: {share:g}")
     if loop.delay is not None and loop.delay != loop.wall_delay:
         wall = format_quantity(float(loop.delayed_wall_stiffness or 0), "N/m")
-        delays = f"{loop.delay} samples, {float(loop.wall_delay):g} in the test of K₀"
-        sentences.append(f"A delay of {delays}, allows a wall of {wall}")
+        delay = f"{count_text(loop.delay, 'sample')}, {float(loop.wall_delay):g} in the test of K₀"
+        sentences.append(f"A delay of {delay}, allows a wall of {wall}")
     return sentences
 
 
