@@ -322,7 +322,7 @@ BAD = [
     (["simulate", "{still}", "--duration", "1e300s"], "duration must be at most"),
     (["simulate", "{still}", "--stiffness", "1" + "0" * 400], "stiffness must be finite"),
     (["onset", "{still}", "--delays", "1e20"], "delay must be at most"),
-    (["simulate", "{still}", "--device", "omega.3"], "apparent_mass is not known"),
+    (["simulate", "{still}", "--device", "omega.3"], "else --set apparent_mass=50g"),
     (["simulate", "{still}", "--law", "Z"], "law"),
     (["simulate", "{still}", "--friction", "0.3"], "law A cannot have it, law W, C, D, F, H can"),
     (["onset", "{still}", "--laws", "WF", "--set", "continuity=2"], "law H does"),

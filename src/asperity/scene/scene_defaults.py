@@ -85,7 +85,9 @@ def _make_mass(device: Device, has_resonance: bool) -> tuple[Plant, list[str]]:
     if mass is None:
         raise ParameterError(
             "device",
-            f'{device.id}: its apparent_mass is not known: give [device] apparent_mass = "50 g"',
+            f"{device.id}: its apparent_mass is not known: in a scene it is a key of [device], "
+            "else {apparent_mass}",
+            apparent_mass="50 g",
         )
     notes = []
     values: dict[str, float] = {}
