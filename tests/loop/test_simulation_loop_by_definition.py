@@ -189,7 +189,7 @@ class Recorder:
         return int(self.stops(x, len(self.inputs)))
 
 
-def run(samples: int, *, every: int = 1, done: int = 1, rows: int = 99, x: Any = None) -> Any:
+def run(samples: int, *, done: int = 1, rows: int = 99, x: Any = None) -> Any:
     """Return stop, rows, state of the servo, samples, head of the queue and the anchor positions.
 
     A second lane, which has stopped before, is left alone.
@@ -213,7 +213,7 @@ def run(samples: int, *, every: int = 1, done: int = 1, rows: int = 99, x: Any =
         np.zeros((2, 3)),
         np.array([7.0, 8.0]),
     )
-    row_counters = np.array([0, -done % every])
+    row_counters = np.array([0])
     settings: Any = SimpleNamespace(period=0.5)
     stopped = [table[1].copy() for table in lanes]
     lane_loop.run_lanes(
@@ -224,7 +224,6 @@ def run(samples: int, *, every: int = 1, done: int = 1, rows: int = 99, x: Any =
         settings,
         np.zeros((rows, 9)),
         row_counters,
-        every,
         "texture",
         (0.5, 9.0),
     )
@@ -259,28 +258,13 @@ def test_first_sample_reads_the_initial_state(monkeypatch: pytest.MonkeyPatch) -
     assert recorder.flushed == [0]
 
 
-@pytest.mark.parametrize(
-    ("every", "done", "expected"),
-    [
-        (1, 0, [0, 1, 2, 3, 4, 5, 6]),
-        (3, 0, [0, 3, 6]),
-        (3, 1, [3, 6]),
-        (3, 2, [3, 6]),
-        (3, 3, [3, 6, 9]),
-        (10, 1, []),
-    ],
-)
-def test_rows_are_written_at_multiples_of_every(
-    every: int, done: int, expected: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("done", [0, 3])
+def test_a_row_is_written_of_every_sample(done: int, monkeypatch: pytest.MonkeyPatch) -> None:
     recorder = Recorder(monkeypatch)
-    result = run(7, every=every, done=done)
-    assert result[1] == len(expected)
-    assert [row for row, _time, _force in recorder.rows] == list(range(len(expected)))
-    assert [time for _row, time, _force in recorder.rows] == [0.5 * sample for sample in expected]
-    assert [force for _row, _time, force in recorder.rows] == [s - done + 1 for s in expected]
+    assert run(7, done=done)[1] == 7
+    assert recorder.rows == [(row, 0.5 * (done + row), row + 1) for row in range(7)]
     recorder.rows.clear()
-    assert run(7, every=every, done=done, rows=0)[1] == 0
+    assert run(7, done=done, rows=0)[1] == 0
     assert recorder.rows == []
 
 

@@ -83,7 +83,8 @@ def test_rows_at_the_force_limit_and_below_the_depth_are_counted(tmp_path: Path,
     assert 100 < limits.force_limited == run.force_limited < 1000
     assert 100 < limits.too_deep == run.too_deep <= 1000
     assert limits.deepest == pytest.approx(run.deepest)
-    assert f"{limits.too_deep} samples lie below max_depth, 400 µm" in recording_answer(recording)
+    text = f"The probe was below max_depth, 400 µm, in {limits.too_deep} samples, up to "
+    assert text in recording_answer(recording)
     assert certify_recording(read_samples(path)).limits == limits
     assert asp.replay(recording).limits == limits
 

@@ -88,14 +88,12 @@ class LaneTrace(NamedTuple):
 
     Attributes:
         rows: rows to write (n, columns), see ``COLUMNS``; none are written if n is 0.
-        counters: rows written, and samples until the next row (2,).
-        every: samples per row.
+        counters: number of rows written (1,).
         statistics: statistics of the lane; none if empty.
     """
 
     rows: FloatArray
     counters: IntArray
-    every: int
     statistics: FloatArray
 
 
@@ -107,7 +105,6 @@ def run_lanes(
     settings: ServoSettings,
     rows: FloatArray,
     row_counters: IntArray,
-    every: int,
     texture: object,
     law: tuple[float, ...],
 ) -> None:
@@ -120,8 +117,7 @@ def run_lanes(
         plant: record of the body.
         settings: settings of the servo.
         rows: rows of the trace of a single lane, see :class:`LaneTrace`; none for several.
-        row_counters: counters of these rows.
-        every: samples per row.
+        row_counters: number of these rows written (1,).
         texture: record of the texture.
         law: parameters of the law, of which the first is replaced by the stiffness of the lane.
     """
@@ -145,7 +141,7 @@ def run_lanes(
                 0.0,
                 (),
             )
-            trace = LaneTrace(rows, row_counters, every, lanes.statistics[lane])
+            trace = LaneTrace(rows, row_counters, lanes.statistics[lane])
             parameters = (lanes.stiffness[lane],) + law[1:]  # noqa: RUF005 - no stars in Numba
             state = load_state(lanes, lane)
             memory = lanes.memories[lane]
@@ -223,11 +219,8 @@ def trace_sample(
         update_statistics(trace.statistics, device.x, device.ledger)
     if trace.rows.shape[0] == 0:
         return
-    if trace.counters[1] == 0:
-        write_row(trace.counters[0], sample * settings.period, servo, trace.rows, device)
-        trace.counters[0] += 1
-        trace.counters[1] = trace.every
-    trace.counters[1] -= 1
+    write_row(trace.counters[0], sample * settings.period, servo, trace.rows, device)
+    trace.counters[0] += 1
 
 
 def trace_timing(trace: LaneTrace, lateness: int, duration: int) -> None:

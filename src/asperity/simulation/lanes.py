@@ -147,12 +147,7 @@ class LaneLoop:
         return float(self._kernels.stored_energy_at(state, anchor, self._plant.record))
 
     def run(
-        self,
-        lanes: Sequence[Lane],
-        samples: int,
-        anchor: FloatArray,
-        rows: FloatArray = NO_ROWS,
-        every: int = 1,
+        self, lanes: Sequence[Lane], samples: int, anchor: FloatArray, rows: FloatArray = NO_ROWS
     ) -> int:
         """Run lanes over a number of samples.
 
@@ -162,8 +157,7 @@ class LaneLoop:
             anchor: positions of the hand's anchor [m], shape (k, 3), contiguous: from the counter
                 ``FIRST_SAMPLE`` of the lanes to the last sample of any; it moves at constant
                 velocity in between.
-            rows: rows of a single lane to write, shape (at least samples/every + 1, columns).
-            every: samples per row.
+            rows: rows of a single lane to write, shape (at least samples, columns).
 
         Returns:
             Number of rows written.
@@ -176,7 +170,7 @@ class LaneLoop:
         queues = np.zeros((len(lanes), 1 + max(lane.delay for lane in lanes), 3))
         for queue, lane in zip(queues, lanes, strict=True):
             queue[: lane.delay + 1] = lane.queue
-        row_counters = np.array([0, -lanes[0].samples % every])
+        row_counters = np.array([0])
         self._kernels.run_lanes(
             Lanes(
                 queues=queues,
@@ -190,7 +184,6 @@ class LaneLoop:
             self._servo.settings,
             rows,
             row_counters,
-            every,
             surface.texture.arguments,
             surface.loop_arguments,
         )

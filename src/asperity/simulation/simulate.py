@@ -74,14 +74,13 @@ class Simulation(Lane):
         self._loop = LaneLoop(surface, plant, servo)
         self._energy_at_start = 0.0
 
-    def run(self, anchor: FloatArray, trace: FloatArray = NO_ROWS, every: int = 1) -> StopReason:
+    def run(self, anchor: FloatArray, trace: FloatArray = NO_ROWS) -> StopReason:
         """Run one sample for each row of the anchor's motion but the last.
 
         Args:
             anchor: positions of the hand's anchor at the samples [m], shape (k + 1, 3), contiguous;
                 it moves at constant velocity in between. The first row is its current position.
-            trace: rows to write, shape (at least k/every + 1, columns); none by default.
-            every: samples per row.
+            trace: rows to write, shape (at least k, columns); none by default.
 
         Returns:
             Why the run stopped before the end.
@@ -90,7 +89,7 @@ class Simulation(Lane):
         if first == 0:
             self._energy_at_start = self._loop.stored_energy(self.state, anchor[0])
         self.counters[FIRST_SAMPLE] = first
-        self.rows_written = self._loop.run([self], len(anchor) - 1, anchor, trace, every)
+        self.rows_written = self._loop.run([self], len(anchor) - 1, anchor, trace)
         self._anchor = anchor[self.samples - first].copy()
         return self.stop
 
@@ -153,9 +152,9 @@ def simulate(
         trace: whether to store the trace in memory, or the path of its file: a recording (.mcap),
             which :func:`~asperity.recording.table_export.export_recording` writes as a table. Rows
             are written as they come, so memory does not depend on the duration.
-        every: samples per row of the trace.
+        every: samples per row of the trace; statistics and counts use every sample.
         max_rows: largest number of rows in memory, decimated evenly; by default all rows, so that
-            memory grows with the duration. Tail statistics always use all rows.
+            memory grows with the duration.
         progress: called with the completed fraction, in [0, 1].
         metadata: metadata of a recording besides surface, servo and hand; plain data.
 
@@ -198,7 +197,7 @@ def simulate(
     tail = None
     counts = RunCounts(surface, servo)
     if trace is not False:
-        tail = TailStatistics(rows)
+        tail = TailStatistics(samples)
     try:
         stop = _run_chunks(simulation, anchor_chunk, samples, writer, tail, counts, every, progress)
     finally:
@@ -304,13 +303,14 @@ def _run_chunks(
     every: int,
     progress: Callable[[float], None] | None,
 ) -> StopReason:
-    buffer = np.empty((CHUNK_SAMPLES // every + 1, len(COLUMNS)))
+    buffer = np.empty((CHUNK_SAMPLES, len(COLUMNS)))
     while simulation.samples < samples:
-        stop = simulation.run(anchor_chunk(simulation.samples), buffer, every)
+        first = simulation.samples
+        stop = simulation.run(anchor_chunk(first), buffer)
         rows = buffer[: simulation.rows_written]
         counts.update(rows)
         if tail is not None:
-            trace.append(rows)
+            trace.append(rows[-first % every :: every])
             tail.update(rows)
         if progress is not None:
             progress(simulation.samples / samples)

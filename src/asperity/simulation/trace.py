@@ -359,16 +359,16 @@ class Run(NamedColumns, Plottable):
             workspace, with the sample that the body could not follow).
         stop_location: where the handle left the workspace, in words.
         path: path of the trace file, or empty.
-        tail: statistics of the last quarter, from all traced rows; ``None`` if none were traced.
+        tail: statistics of the last quarter, from every sample; ``None`` without a trace.
         notes: sentences on parameters of the plant that are guesses.
         truncated_ticks: ticks whose search for closest points reached the evaluation budget.
         search_error: largest error bound of a truncated search [m]: on the nearest contact no
             surface point was closer than the one found by more than this; on the split contact the
             force was accurate to stiffness times this.
-        force_limited: traced samples whose force was limited to that of the device.
-        too_deep: traced samples below ``max_depth``, for which the surface was analysed.
+        force_limited: samples whose force was limited to that of the device.
+        too_deep: samples below ``max_depth``, for which the surface was analysed.
         deepest: greatest depth of these [m]; 0 for none.
-        slipped: energy that the slip of the friction's anchor took [J], by the traced samples.
+        slipped: energy that the slip of the friction's anchor took [J].
         deflected: energy stored in the deflection of that anchor at the end [J].
     """
 

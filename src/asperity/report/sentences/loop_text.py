@@ -69,7 +69,8 @@ def limit_texts(counts: Run | LoopStatistics | LimitCounts, max_depth: float) ->
         depth = format_quantity(max_depth, "m")
         deepest = format_quantity(counts.deepest, "m", digits=3)
         count = count_text(counts.too_deep, "sample")
-        sentences.append(f"{count} lie below max_depth, {depth}: the deepest {deepest}")
+        below = f"The probe was below max_depth, {depth}, in {count}"
+        sentences.append(f"{below}, up to {deepest} deep")
     return sentences
 
 
