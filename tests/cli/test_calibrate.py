@@ -46,7 +46,8 @@ def test_simulated_device_is_measured_and_written(call: Call, tmp_path: Path) ->
     for compared, start in ((base, before), (device_path, after)):
         row = asp.compare(asp.Sinusoid(1e-4, 2e-3), compared, "H").rows[0]
         assert row.recommended_stiffness == pytest.approx(start, rel=2e-3)
-    assert after > 2.0 * before
+    # A known damping makes it limit the buzz.
+    assert after < before
 
 
 def test_devices_that_cannot_be_measured_are_refused(call: Call, tmp_path: Path) -> None:

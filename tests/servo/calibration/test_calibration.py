@@ -51,6 +51,7 @@ from asperity.servo.calibration.identification import (
     oscillation_amplitudes,
     position_step,
     rest_noise,
+    simulated_signs,
 )
 from asperity.servo.calibration.measured_device import measured_device
 from asperity.servo.driver import AWAY, RIGHT, TOWARDS, UP, surface_frame
@@ -96,6 +97,41 @@ def test_parameters_of_random_devices_are_recovered(
             assert dynamics.mass.value == pytest.approx(mass, rel=0.02)
         weakest = min(range(3), key=lambda i: device.damping[i])
         assert calibration.weakest_axis.name == "xyz"[weakest]
+
+
+@pytest.mark.parametrize(
+    ("damping", "friction"),
+    [(2.0, 0.26), (1.0, 0.26), (2.2, 0.26), (2.0, 0.15), (0.5, 0.05), (2.0, 0.0)],
+)
+def test_damping_and_friction_are_within_their_uncertainty(damping: float, friction: float) -> None:
+    """Coarse readings of a light handle; friction does not count as damping."""
+    servo = Servo(1e-3, delay=1, position_resolution=5.5e-5)
+    plant = Cartesian(0.045, damping, friction=friction)
+    driver = simulated_driver(plant, SpringHand(), servo, ORIGIN, 1e-3, device_resolution=True)
+    loop = Servo(1e-3, max_force=1.0)
+    calibration = Calibrator(UnclockedRig(driver, loop, SAFE), SAFE.ramp).run()
+    for axis in calibration.axes:
+        for estimate, true in (
+            (axis.dynamics.damping, damping),
+            (axis.dynamics.friction, friction),
+        ):
+            assert abs(estimate.value - true) < 2.5 * estimate.uncertainty
+            assert estimate.uncertainty < max(0.3 * true, 2e-3)
+        assert axis.dynamics.mass.value == pytest.approx(0.045, rel=0.02)
+    device = measured_device(load_device("touch"), calibration, "mine", "today", simulated=True)
+    assert 0.3 * damping < (device.value("damping") or 0.0) < damping
+
+
+def test_simulated_sign_reverses_within_a_sample_and_sticks() -> None:
+    """Friction of 0.1 N on 0.1 kg: +1 m/s² for 10 samples, -3 m/s² for 3 1/3, then -1 m/s²."""
+    forces = np.concatenate([np.full(10, 0.2), np.full(10, -0.2), np.full(9, -0.05)])
+    signs = simulated_signs(forces, 0.1, 1e-9, 0.1, 1e-3)
+    np.testing.assert_allclose(signs[:13], 1.0)
+    np.testing.assert_allclose(signs[13:15], [1.0 / 3.0 - 2.0 / 3.0, -1.0], atol=1e-6)
+    # From 6 2/3 mm/s it comes to rest at 0.5 m/s², held by half of the friction.
+    long = simulated_signs(np.append(forces, np.full(9, -0.05)), 0.1, 1e-9, 0.1, 1e-3)
+    np.testing.assert_allclose(long[20:33], -1.0)
+    np.testing.assert_allclose(long[33:], [-1.0 / 3.0 - 1.0 / 3.0, *[-0.5] * 4], atol=1e-6)
 
 
 WRONG = {"delay": 1, "step": 1.06, "period": 1.06, "damping": 1.15}

@@ -7,7 +7,9 @@ m p'' = u(t - d T) - b p' - F_c sign p' + c, integrated twice over a segment of 
 
 linear in the unknowns. ∬u of a force that is held from sample to sample is exact; a₀, a₁ and a₂
 contain initial position, initial velocity and a constant force. The delay is the whole number of
-samples with the least sum of squares.
+samples with the least sum of squares, with the sign of displacements. That sign is late where the
+velocity reverses, and friction then counts as damping: the numbers of the body are therefore fitted
+with the sign of the motion that they cause themselves, which is simulated.
 
 Reference:
     Integrating a model instead of differentiating a record: Young, "Parameter estimation for
@@ -22,6 +24,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
@@ -32,7 +36,11 @@ SEGMENTS = 8
 """Number of segments of a record; the scatter of their fits is the uncertainty."""
 _MIN_STEP = 1e-10  # [m] smaller steps are rounding errors of a position
 _GRID_TOLERANCE = 0.1  # of a step: positions further from its multiples are not on a grid
-_SMOOTHING_DIVISOR = 8
+_SMOOTHING_DIVISOR = 8  # pushes over which the sign of a displacement is taken
+_LEAST_START = np.array([1e-3, 1e-2, 1e-3])  # [kg], [N s/m] and [N]
+_MAX_EVALUATIONS = 30  # of a fit, besides derivatives
+_UNCERTAIN_SHARE = 0.2  # of the change that simulated reversals make
+_LEAST_UNCERTAINTY = 1e-3  # relative: no friction acts exactly as it is simulated
 _FAST_STEPS = 3.0  # steps per sample of a handle that moves in every fresh reading
 
 
@@ -206,40 +214,48 @@ def _best_delay(errors: FloatArray) -> int:
     return int(np.argmin(np.log(errors + 1e-300).sum(axis=0)))
 
 
-def _segments(
-    record: PushRecord, delay: int, period: float, smoothing_divisor: int = _SMOOTHING_DIVISOR
-) -> list[NormalEquations]:
+def _held_forces(record: PushRecord, delay: int) -> FloatArray:
+    """Return the forces held at the samples, which were commanded ``delay`` samples before [N]."""
+    return np.concatenate([np.zeros(delay), record.forces])[: len(record.forces)]
+
+
+def _segment_edges(count: int) -> NDArray[np.int64]:
+    """Return where segments begin and end; the ends of a record have no velocity."""
+    return np.linspace(MAX_DELAY, count, SEGMENTS + 3).astype(np.int64)[1:-1]
+
+
+def _segments(record: PushRecord, delay: int, period: float) -> list[NormalEquations]:
     """Return the normal equations of the segments of a record, for a delay.
 
-    The sign of the velocity is that of the displacement over 1/``smoothing_divisor`` of a push to
-    both sides.
+    The sign of the velocity is that of the displacement over an eighth of a push to both sides.
     """
-    signs = velocity_sign(record.positions, max(1, record.push_samples // smoothing_divisor))
-    # The force held at sample k was commanded d samples before.
-    held = np.concatenate([np.zeros(delay), record.forces])[: len(record.forces)]
-    edges = np.linspace(MAX_DELAY, len(held), SEGMENTS + 3).astype(int)
-    # The ends of the record have no velocity.
-    parts = [slice(a, b) for a, b in pairwise(edges[1:-1])]
-    return [
-        _normal_equations(record.positions[part], held[part], signs[part], period) for part in parts
-    ]
+    signs = velocity_sign(record.positions, max(1, record.push_samples // _SMOOTHING_DIVISOR))
+    means = 0.5 * (signs + np.append(signs[1:], signs[-1]))
+    tables = _regressors(record.positions, _held_forces(record, delay), means, period)
+    return [np.asarray(table.T @ table) for table in tables]
 
 
-def _normal_equations(
-    positions: FloatArray, applied_forces: FloatArray, signs: FloatArray, period: float
-) -> NormalEquations:
-    """Return the normal equations of a segment.
+def _regressors(
+    positions: FloatArray, held_forces: FloatArray, signs: FloatArray, period: float
+) -> list[FloatArray]:
+    """Return p, ∫p, ∬sign p' and ∬u of each segment (n, 4), without a₀ + a₁ t + a₂ t².
 
-    The part of the form a₀ + a₁ t + a₂ t² is removed from all columns.
+    Args:
+        positions: positions of a record [m].
+        held_forces: force held over each of its samples [N].
+        signs: mean sign of the velocity over each sample.
+        period: T [s].
     """
-    moved = positions - positions[0]
-    once = period * np.concatenate([[0.0], np.cumsum(0.5 * (moved[1:] + moved[:-1]))])
-    rubbed = integrate_twice(0.5 * (signs + np.append(signs[1:], signs[-1])), period)
-    given = integrate_twice(applied_forces, period)
-    basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(moved)), 3))[0]
-    table = np.column_stack([moved, once, rubbed, given])
-    table -= basis @ (basis.T @ table)
-    return np.asarray(table.T @ table)
+    tables = []
+    for first, last in pairwise(_segment_edges(len(positions))):
+        moved = positions[first:last] - positions[first]
+        once = period * np.concatenate([[0.0], np.cumsum(0.5 * (moved[1:] + moved[:-1]))])
+        rubbed = integrate_twice(signs[first:last], period)
+        given = integrate_twice(held_forces[first:last], period)
+        basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(moved)), 3))[0]
+        table = np.column_stack([moved, once, rubbed, given])
+        tables.append(table - basis @ (basis.T @ table))
+    return tables
 
 
 def _fit(segments: Sequence[NormalEquations]) -> tuple[FloatArray, float]:
@@ -262,28 +278,85 @@ def _fit(segments: Sequence[NormalEquations]) -> tuple[FloatArray, float]:
     return whole, max(left, 0.0) / max(float(whole[0]) ** 2, 1e-12)
 
 
+def simulated_signs(
+    held_forces: FloatArray, mass: float, damping: float, friction: float, period: float
+) -> FloatArray:
+    """Return the mean sign of the velocity over each sample, of a body that starts at rest.
+
+    While it sticks, the sign is the share of the friction that holds it.
+
+    Args:
+        held_forces: force held over each sample [N].
+        mass: [kg].
+        damping: [N s/m].
+        friction: dry friction, above zero [N].
+        period: T [s].
+    """
+    gain = period / (mass + 0.5 * damping * period)
+    kept = 1.0 - damping * gain
+    velocity = 0.0
+    signs = []
+    for force in held_forces.tolist():
+        at_rest = min(max(force / friction, -1.0), 1.0)
+        sign = math.copysign(1.0, velocity) if velocity else at_rest
+        end = kept * velocity + gain * (force - friction * sign)
+        if end * velocity < 0.0:  # it reverses, or stops, within the sample
+            before = velocity / (velocity - end)
+            sign = before * sign + (1.0 - before) * at_rest
+            end = (1.0 - before) * gain * (force - friction * at_rest)
+        signs.append(sign)
+        velocity = end
+    return np.array(signs)
+
+
 def _estimate_dynamics(
     record: PushRecord, segments: Sequence[NormalEquations], delay: int, period: float
 ) -> AxisDynamics:
     """Return the dynamics of a record, with uncertainties.
 
-    The random part is the larger of the jackknife's scatter over the segments and that of the least
-    squares, since equal pushes hardly separate damping from friction. The systematic part is the
-    change of the result when the sign of the velocity is taken over twice the displacement.
+    The systematic part is a share of the change that simulated reversals make, and of the value.
     """
-    whole, error = _fit(segments)
-    count = len(segments)
-    others = np.array([_fit([*segments[:i], *segments[i + 1 :]])[0] for i in range(count)])
-    spread = np.sqrt((count - 1) ** 2 / count * others.var(axis=0, ddof=1))
-    square = np.sum(segments, axis=0)[:3, :3]
-    size = np.sqrt(np.diag(square))
-    size[size == 0.0] = 1.0
-    inverse = np.linalg.pinv(square / np.outer(size, size)) / np.outer(size, size)
-    formal = float(whole[0]) * np.sqrt(error / len(record.positions) * np.abs(np.diag(inverse)))
-    smoother, _error = _fit(_segments(record, delay, period, _SMOOTHING_DIVISOR // 2))
-    uncertainty = np.hypot(np.maximum(spread, formal), whole - smoother)
-    pairs = zip(whole.tolist(), uncertainty.tolist(), strict=True)
+    first = _fit(segments)[0]
+    start = np.maximum(first, _LEAST_START)
+    values, random = _fit_simulated(record, _held_forces(record, delay), start, period)
+    model = np.hypot(_UNCERTAIN_SHARE * (values - first), _LEAST_UNCERTAINTY * values)
+    uncertainty = np.hypot(random, model)
+    pairs = zip(values.tolist(), uncertainty.tolist(), strict=True)
     return AxisDynamics(*(Estimate(value, sigma) for value, sigma in pairs))
+
+
+def _fit_simulated(
+    record: PushRecord, held_forces: FloatArray, start: FloatArray, period: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return mass, damping and friction that fit with simulated signs, and their random part.
+
+    It contains the uncertainty of the least squares and the scatter over the segments.
+    """
+
+    def residuals(numbers: FloatArray) -> FloatArray:
+        mass, damping, friction = map(float, numbers)
+        signs = simulated_signs(held_forces, mass, damping, friction, period)
+        table = np.concatenate(_regressors(record.positions, held_forces, signs, period))
+        # In metres, since it is the positions that have steps and noise.
+        return np.asarray(table @ np.array([-mass, -damping, -friction, 1.0]) / mass)
+
+    found = least_squares(
+        residuals,
+        start,
+        bounds=(1e-6 * start, math.inf),
+        x_scale=start,
+        diff_step=np.full(3, 1e-3),
+        ftol=1e-7,
+        xtol=1e-5,
+        max_nfev=_MAX_EVALUATIONS,
+    )
+    slopes = np.asarray(found.jac, dtype=np.float64) * start
+    inverse = np.linalg.pinv(slopes.T @ slopes)
+    edges = _segment_edges(len(held_forces))
+    gradients = np.add.reduceat(slopes * found.fun[:, np.newaxis], edges[:-1] - edges[0])
+    scatter = np.square(gradients @ inverse).sum(axis=0) * SEGMENTS / (SEGMENTS - 1)
+    formal = np.diag(inverse) * np.square(found.fun).mean()
+    return found.x, start * np.sqrt(scatter + formal)
 
 
 STIFFNESS_FACTOR = 1.3
