@@ -94,6 +94,11 @@ def test_limit_of_each_criterion_equals_its_formula(name: str, expected: float) 
     assert criterion.limit == pytest.approx(expected, rel=1e-15)
     assert criterion.margin == pytest.approx(expected / 500.0, rel=1e-15)
     assert criterion.holds is (expected >= 500.0)
+    if name == "smooth-wall rule":
+        assert criterion.formula == "k q <= K₀ (1/2 + d₀)/(1/2 + d)"
+        for delay in ({"delay_samples": 0}, {}):
+            same = assess(Surface(WAVE, "C"), {"max_stiffness": "5 N/mm", **delay})
+            assert same.criterion(name).formula == "k q <= K₀"
     assert criterion.missing == ()
 
 

@@ -211,9 +211,19 @@ def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
 
 
 def _wall_rule(loop: DeviceLoop) -> StiffnessRule:
-    budget = loop.delayed_wall_stiffness
+    """The paper's rule has no delay: it is that of a loop with the delay d₀ of the wall test."""
+    formula = "k q <= K₀"
+    if loop.delay not in (None, loop.wall_delay):
+        formula += " (1/2 + d₀)/(1/2 + d)"
     return StiffnessRule(
-        WALL, "k q <= K₀", _ZERO, _ONE, budget, ("max_stiffness",), friction_term="3/2 κ"
+        WALL,
+        formula,
+        _ZERO,
+        _ONE,
+        loop.delayed_wall_stiffness,
+        ("max_stiffness",),
+        used_fields=("delay_samples",),
+        friction_term="3/2 κ",
     )
 
 

@@ -231,8 +231,9 @@ def passivity(
     * delay: k (q⁺/2 + d q) <= σ₀/T, for a conservative law;
     * virtual damping: k (q⁺/2 + d q) T + |b_v| <= σ₀, for a conservative law;
     * steps and friction: k q |δ|/2 + |b|/2 <= f_c, for a conservative law, beside one of these;
-    * smooth-wall rule: k q <= K₀, as printed in the paper's III.B: a rule of thumb;
-    * wall test: k (q⁺/2 + d q) <= K₀ (1/2 + d), k q <= K₀ for any delay, for a conservative law:
+    * smooth-wall rule: k q <= K₀, as printed in the paper's III.B, in a loop with the delay d₀ of
+      the wall test, else k q <= K₀ (1/2 + d₀)/(1/2 + d): a rule of thumb;
+    * wall test: k (q⁺/2 + d q) <= K₀ (1/2 + d₀), k q <= K₀ for any delay, for a conservative law:
       plausible, not proved;
     * leak: no loop of the field gains energy;
     * dry friction: f_c takes as much on every loop as the field gains, whatever the speed.

@@ -405,8 +405,8 @@ _ASSUMPTIONS: dict[str, Callable[[DeviceLoop], str]] = {
     VIRTUAL: _virtual_damping_assumptions,
     QUANTIZATION: _quantization_assumptions,
     WALL: lambda _loop: (
-        "the paper's III.B as printed, for every law; a rule of thumb: that a wall did not cycle "
-        "proves no damping, and no norm bounds what a field with curl gains"
+        "the paper's III.B, for every law, at the delay of the loop; a rule of thumb: that a wall "
+        "did not cycle proves no damping, and no norm bounds what a field with curl gains"
     ),
     WALL_TEST: _wall_test_assumptions,
     LEAK: _leak_assumptions,
