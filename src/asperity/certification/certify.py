@@ -386,7 +386,7 @@ class _Search:
         """Return where the force begins, and points with a force, shape (n, 3).
 
         Raises:
-            ParameterError: if there are none.
+            ParameterError: if there are none, or none that is finite.
         """
         calls = self.calls
         region = calls.region
@@ -400,6 +400,11 @@ class _Search:
         low = float(region.low[2])
         high = float(region.high[2])
         if not has_force.any():
+            if calls.invalid_at is not None:
+                place = ", ".join(
+                    format_quantity(value, "m", digits=4) for value in calls.invalid_at
+                )
+                raise ParameterError("renderer", f"gives no force that is finite at {place}")
             raise ParameterError("region", f"has no force anywhere: {count} places were tried")
         xy = points[: count // 16, :2]
         heights = contact_heights(calls, xy, low, high)
