@@ -216,7 +216,7 @@ def test_flat_wall_is_baked_exactly() -> None:
     assert surface.texture.accuracy.share == 0.0
 
 
-def test_field_describes_itself_and_its_source() -> None:
+def test_field_describes_itself_and_its_source(monkeypatch: pytest.MonkeyPatch) -> None:
     surface, exact = baked("map")
     field = field_of(surface)
     assert field.bytes == field.arguments.c.nbytes + field.arguments.columns.nbytes
@@ -227,6 +227,8 @@ def test_field_describes_itself_and_its_source() -> None:
     assert content["gain"]["upper"] == field.gain.upper
     assert content["accuracy"]["rms"] == field.accuracy.rms
     assert "not smoothed" in field.preparation[-1]
+    monkeypatch.setattr(type(field), "resolution", 0.348)
+    assert "nodes, 348 mm apart, " in field.preparation[-1]
     assert field.digest != exact.texture.digest
     xy = np.array([[1e-4, 2e-4]])
     np.testing.assert_array_equal(field.height(xy), exact.texture.height(xy))

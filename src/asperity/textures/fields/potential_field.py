@@ -182,7 +182,7 @@ class PotentialField(Texture, Tabular):
                 q += f", computed from its coefficients: the file claims {self.claimed_gain:.4g}"
         text = (
             f"Law H baked as a potential field: {self.nodes} nodes,"
-            f" {1e6 * self.resolution:.3g} µm apart, {how}; {q};{claim}"
+            f" {format_length(self.resolution)} apart, {how}; {q};{claim}"
             f" force {100 * accuracy.share:.2g} % RMS from exact H"
             f" at the worst of {len(accuracy.depths)} {presses} (at {depth}; deeper than {deepest}"
             f" it is not known){missed * accuracy.is_limited}; contact begins up to {onset} from"
