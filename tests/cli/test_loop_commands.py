@@ -399,4 +399,6 @@ def test_run_stops_when_the_plant_leaves_its_workspace(call: Call, tmp_path: Pat
     (tmp_path / "far.toml").write_text(text + far)
     code, out, err = call("simulate", str(tmp_path / "far.toml"))
     assert (code, err) == (0, "")
-    assert "The run stopped: it left the workspace" in " ".join(out.split())
+    words = " ".join(out.split())
+    assert "The run stopped: it left the workspace: from (" in words
+    assert "an arm is stretched or folded within a sample" in words

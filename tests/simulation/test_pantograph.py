@@ -314,7 +314,7 @@ def test_unlimited_friction_stops_the_handle_in_one_step() -> None:
 def test_run_stops_at_the_edge_of_the_workspace() -> None:
     motion = Waypoints([0.0, 1.0], [[0.0, 0.0, 0.02], [0.0, 0.0, 0.12]])
     run = simulate(Surface(WAVE, "W", 500.0), Pantograph(), SPRING, Servo(1e-3), motion, 1.0)
-    assert run.stop_message.startswith("left the workspace: at (")
+    assert run.stop_message.startswith("left the workspace: from (")
     assert 0 < run.samples < 1000
     np.testing.assert_array_equal(run.position[-1], run.state[:3])
     plant = Pantograph()

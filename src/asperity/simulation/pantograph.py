@@ -162,14 +162,14 @@ class Pantograph(Plant):
         return ""
 
     def describe_exit(self, state: FloatArray) -> str:
-        """Return where the handle left the workspace."""
+        """Return from where the handle left the workspace, within a sample."""
         x = state[0]
         z = state[2]
         vx = state[3]
         vz = state[5]
         place = f"({x:.4g}, 0, {z:.4g}) m"
         speed = f"({vx:.3g}, 0, {vz:.3g}) m/s"
-        return f"at {place} with {speed} an arm is almost stretched or folded"
+        return f"from {place} with {speed}, an arm is stretched or folded within a sample"
 
     def min_damping(
         self, low: ArrayLike, high: ArrayLike, hand: Hand | None = None, top: float = 0.0
