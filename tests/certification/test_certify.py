@@ -187,9 +187,7 @@ def test_force_that_is_not_finite_is_found_with_its_place(library: str) -> None:
     assert certification_answer(result).startswith(f"The force is not finite at {point_text(at)}. ")
     assert abs(at[0] - 2e-4) < 5e-5
     assert abs(at[2] + 3e-4) < 5e-5
-    with pytest.raises(
-        ParameterError, match="renderer gives no force that is finite at -?[0-9.]+ [µm]"
-    ):
+    with pytest.raises(ParameterError, match="gives no force that is finite at"):
         certify(lambda points: np.full((len(points), 3), np.nan), region=BOX, seconds=0.2)
 
 

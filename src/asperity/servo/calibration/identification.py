@@ -293,13 +293,13 @@ def simulated_signs(
         period: T [s].
     """
     gain = period / (mass + 0.5 * damping * period)
-    kept = 1.0 - damping * gain
+    decay = 1.0 - damping * gain
     velocity = 0.0
     signs = []
     for force in held_forces.tolist():
         at_rest = min(max(force / friction, -1.0), 1.0)
         sign = math.copysign(1.0, velocity) if velocity else at_rest
-        end = kept * velocity + gain * (force - friction * sign)
+        end = decay * velocity + gain * (force - friction * sign)
         if end * velocity < 0.0:  # it reverses, or stops, within the sample
             before = velocity / (velocity - end)
             sign = before * sign + (1.0 - before) * at_rest
