@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -501,3 +502,31 @@ def test_minimum_excludes_a_box_where_its_supporting_function_is_convex(
     moved = closest_search.minimum_at((0.1, 0.0, -1.0), frame, beside, 0 * c)
     flat = (-9.0, 9.0, 0.0, 0.0, 0.0, EXPAND)
     assert not closest_search.excludes_box((0.1, 0.0, -1.0, 1.01), frame, moved, box, flat, 0 * c)
+
+
+def test_axis_without_a_number_between_its_ends_is_not_halved() -> None:
+    stack = np.empty((256, 5))
+    end = 1.0 + EPS
+    frame = (0.0, 0.0, 1.0, 0.0, 1.0, 1.0)
+    minimum = (0.0,) * 7
+    box = (1.0, end, 0.0, EPS)
+    assert closest_search.split_box(frame, minimum, box, stack, 0, None) == 2
+    assert sorted(map(tuple, stack[:2, :4])) == [
+        (1.0, end, 0.0, 0.5 * EPS),
+        (1.0, end, 0.5 * EPS, EPS),
+    ]
+    assert closest_search.split_box(frame, minimum, (1.0, end, 1.0, end), stack, 7, None) == 7
+
+
+def test_full_stack_truncates_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Boxes that are all open, and divided near one corner, fill any stack."""
+
+    def examine_box(*arguments: Any) -> tuple[Any, ...]:
+        _probe, _factor, _frame, _box, best, near, last, left, _texture = arguments
+        return best, near, last, True, left
+
+    monkeypatch.setattr(closest_search, "minimum_at", lambda *_: (-9.0,) * 7)
+    monkeypatch.setattr(closest_search, "examine_box", examine_box)
+    monkeypatch.setattr(closest_search, "box_middle", lambda low, high, *_: 0.1 * low + 0.9 * high)
+    best = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+    assert closest_search.search_boxes(0.0, 0.0, 0.0, best, 1.0, np.inf, None) == (best, 0.0)

@@ -20,14 +20,14 @@ from tests.helpers.c_programs import (
 )
 
 from asperity.surface import Surface
-from asperity.textures import Texture
+from asperity.textures import HeightMap, Profile, Texture
 
 SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O0", "-g")
 LAWS = "BDFH"
 _MAIN = """
 static int {name}_run(const char *file)
 {{
-    double at[3], f[3];
+    {number} at[3], f[3];
     {name}_state state;
     FILE *in = fopen(file, "rb");
     if (in == NULL) {{
@@ -43,10 +43,10 @@ static int {name}_run(const char *file)
 """
 
 
-def _program(names: list[str]) -> str:
+def _program(names: list[str], number: str = "double") -> str:
     includes = "".join(f'#include "{name}.h"\n' for name in names)
     calls = " || ".join(f'{name}_run("{name}.bin")' for name in names)
-    runs = "".join(_MAIN.format(name=name) for name in names)
+    runs = "".join(_MAIN.format(name=name, number=number) for name in names)
     return f"#include <stdio.h>\n{includes}{runs}int main(void)\n{{\n    return {calls};\n}}\n"
 
 
@@ -73,6 +73,32 @@ def test_sanitizers_find_no_undefined_behaviour(
     run_command(tool("sh"), "run.sh", cwd=tmp_path)
     output = (tmp_path / "forces.bin").read_bytes()
     assert hashlib.sha256(output).hexdigest() == digest.hexdigest()
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_search_far_from_the_origin_stays_in_its_arrays(compiler: str, tmp_path: Path) -> None:
+    """In single precision, boxes there cannot be halved, and at last cells are below rounding."""
+    rng = np.random.default_rng(3)
+    heights = rng.normal(size=(33, 41))
+    textures = {
+        "profile": Profile(3e-5 * rng.normal(size=60), 1e-4, periodic=True),
+        "map": HeightMap(2e-7 * heights, (1e-6, 1e-6)),
+        "periodic_map": HeightMap(2e-10 * heights, (1e-9, 1e-9), periodic=True),
+    }
+    distances = np.repeat([1e-3, 1e-2, 0.3, 1.0, 10.0, 100.0, 700.0], 40)[:, None]
+    points = distances * rng.uniform(-1.0, 1.0, (len(distances), 3))
+    points[:, 2] = -(10.0 ** rng.uniform(-7.0, -1.0, len(points)))
+    for name, texture in textures.items():
+        text = header(as_exported(Surface(texture, "D")), name, "float")
+        (tmp_path / f"{name}.h").write_text(text)
+        points.astype(np.float32).tofile(tmp_path / f"{name}.bin")
+    (tmp_path / "main.c").write_text(_program(list(textures), "float"))
+    run_command(tool(compiler), *STRICT, *SANITIZE, "main.c", "-o", "main", "-lm", cwd=tmp_path)
+    (tmp_path / "run.sh").write_text("./main > forces.bin\n")
+    run_command(tool("sh"), "run.sh", cwd=tmp_path)
+    forces = np.fromfile(tmp_path / "forces.bin", np.float32)
+    assert forces.size == len(textures) * points.size
+    assert np.isfinite(forces).all()
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)

@@ -69,8 +69,10 @@ KERNELS = Kernels(
 # Least size of a box that is divided, as a share of the search region. Dividing one box after the
 # other down to it takes 90 of the 256 rows of the stack.
 MIN_SHARE = 2.0**-30
-# Greatest number of boxes on the stack after a box is divided into more than four.
+# Greatest number of boxes on the stack after a box is divided into more than four, and that which
+# leaves rows for four.
 MAX_BOXES = 150
+FULL_STACK = 252
 
 
 def closest_point(x: float, y: float, z: float, texture: object) -> ClosestPoint:
@@ -138,6 +140,8 @@ def search_boxes(
         )
         side = max((east - west) * frame[4], (north - south) * frame[5])
         if is_open and side > smallest:
+            if count > FULL_STACK:  # the search is truncated
+                return best, 0.0
             ball = (x, y, z, best[2] * factor)
             count, left = divide_box(ball, frame, near, box, stack, count, left, texture)
     return best, left
@@ -333,13 +337,20 @@ def split_box(
 ) -> int:
     """Put the halves or quarters of a box on the stack, the one nearest to a minimum on top.
 
-    An axis is halved unless the other is more than twice as long. Return the number of boxes.
+    An axis is halved unless the other is more than twice as long, or no number lies between its
+    ends: a box that cannot be halved is as small as rounding. Return the number of boxes.
     """
     west, east, south, north = box
     width = (east - west) * frame[4]
     height = (north - south) * frame[5]
     middle_u = box_middle(west, east, 0, texture) if width > 0.5 * height else east
     middle_v = box_middle(south, north, 1, texture) if height > 0.5 * width else north
+    if middle_u <= west:
+        middle_u = east
+    if middle_v <= south:
+        middle_v = north
+    if middle_u == east and middle_v == north:
+        return count
     right = minimum[0] >= middle_u
     upper = minimum[1] >= middle_v
     for k in range(4):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.contacts.sampler_interface import Ball
-from asperity.core.compiled import EVERY_FUNCTION, FloatArray, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, FloatArray, Kernels
 
 KERNELS = Kernels(provides=EVERY_FUNCTION)
 
@@ -84,12 +84,12 @@ def fold_cells(
     """Return the first and last cell of a range in the map itself, and the sign and shift.
 
     The coordinate in the map is sign times that of the box, plus the shift. A range across a border
-    of copies has all cells and the sign 0.
+    of copies has all cells and the sign 0, and so has one far away, where cells are below rounding.
     """
     if low >= 0.0 and high <= cells:
         return int(low), max(math.ceil(high) - 1, 0), 1.0, 0.0
     copy = float(math.floor(low / cells))
-    if high > (copy + 1.0) * cells:
+    if high > (copy + 1.0) * cells or abs(low) * EPS >= 1.0:
         return 0, cells - 1, 0.0, 0.0
     if periodic or copy == 2.0 * math.floor(0.5 * copy):
         shift = -copy * cells

@@ -94,6 +94,8 @@ def can_prune_near(ball: Ball, minimum: Minimum, box: Box, texture: SplineArgume
     nx, ny = cell_counts(texture)
     j, _last, sign_u, _shift = fold_cells(box[0], box[1], nx, texture.periodic)
     i, _last, sign_v, _shift = fold_cells(box[2], box[3], ny, texture.periodic)
+    if sign_u * sign_v == 0.0:
+        return False
     probe_u, probe_v = probe_cells(ball, texture)
     probe_u -= box[0]
     probe_v -= box[2]
