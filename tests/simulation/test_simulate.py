@@ -41,6 +41,7 @@ from asperity.textures.kinds.sinusoid import Sinusoid
 WAVE = Sinusoid(amplitude=0.3e-3, period=2e-3, phase=0.3)
 WALL = Surface(WAVE, "W", 500.0)
 HAND = SpringHand(300.0, 3.0, mass=0.03, force=(0.0, 0.0, -0.5))
+COUPLED = [[2.0, 0.5, 0.1], [0.5, 1.0, -0.2], [0.1, -0.2, 0.7]]  # N s/m
 STROKES = Strokes((0.0, 0.0, -1e-3), (8e-3, 0.0, -1e-3), speed=0.08, count=3)
 JOB: dict[str, Any] = {
     "surface": WALL,
@@ -311,6 +312,32 @@ def test_unbalanced_energy_ledger_is_detected() -> None:
     stiff = run_of(hand=SpringHand(1e12))  # thousands of radians per sample
     assert abs(stiff.ledger.closure) > 1e-9 * stiff.ledger.exchanged
     assert not stiff.is_energy_balanced
+
+
+@pytest.mark.parametrize("kind", ["axes", "coupled", "resonance"])
+def test_energy_balance_of_overdamped_loops_closes(kind: str) -> None:
+    """From 0.1 g to 10 kg, and b T/m up to 1e6, where e^{bT/m} has no number."""
+    rng = np.random.default_rng(4)
+    for _case in range(12):
+        masses = 10.0 ** rng.uniform(-4.0, 1.0, 3)
+        period = float(10.0 ** rng.uniform(-4.0, -2.5))
+        ratio = 10.0 ** rng.uniform(0.0, 6.0)
+        plant = Cartesian(
+            masses.tolist(),
+            COUPLED if kind == "coupled" else 1.0,
+            friction=float(rng.choice([0.0, 0.3])),
+            resonance=Resonance(float(rng.uniform(1.0, 300.0))) if kind == "resonance" else None,
+        )
+        damping = float(ratio * masses.min() / period)
+        run = run_of(
+            plant=plant,
+            hand=SpringHand(300.0, damping, force=(0.0, 0.0, -1.0)),
+            servo=Servo(period),
+            duration=200.0 * period,
+            trace=False,
+        )
+        ledger = run.ledger
+        assert abs(ledger.closure) <= 1e-9 * ledger.exchanged, f"b T/m = {ratio:.3g}, {masses}"
 
 
 @pytest.mark.parametrize("rows", [10**15, 10**18])

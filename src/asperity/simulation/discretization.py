@@ -160,8 +160,16 @@ def integrate(
     # e^{AT} - 1 = A ∫ e^{At} dt: no difference of nearly equal numbers.
     unit = np.broadcast_to(np.eye(n), dynamics.shape)
     wide = exponential(span * np.block([[dynamics, unit], [zero, zero]]))
-    # Van Loan: the exponential of [[-Aᵀ, Q], [0, A]] holds e^{-AᵀT} ∫ e^{Aᵀt} Q e^{At} dt.
+    # Van Loan: the exponential of [[-Aᵀ, Q], [0, A]] holds e^{-Aᵀτ} ∫ e^{Aᵀt} Q e^{At} dt. Over a
+    # short τ, for e^{-Aᵀτ} of an overdamped body grows beyond all digits; then τ is doubled.
+    size = span * float(np.abs(dynamics).sum(axis=-1).max())
+    doublings = math.ceil(math.log2(size)) if size > 1.0 else 0
     back = -np.swapaxes(dynamics, -1, -2)
-    large = exponential(span * np.block([[back, loss_rate], [zero, dynamics]]))
-    lost = np.swapaxes(large[..., n:, n:], -1, -2) @ large[..., :n, n:]
+    short = span / 2.0**doublings
+    large = exponential(short * np.block([[back, loss_rate], [zero, dynamics]]))
+    motion = large[..., n:, n:]
+    lost = np.swapaxes(motion, -1, -2) @ large[..., :n, n:]
+    for _ in range(doublings):
+        lost = lost + np.swapaxes(motion, -1, -2) @ lost @ motion
+        motion = motion @ motion
     return dynamics @ wide[..., :n, n:], 0.5 * (lost + np.swapaxes(lost, -1, -2))
