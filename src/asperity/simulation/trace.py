@@ -205,15 +205,15 @@ class _Moments:
             return
         supplied = rows[:, _SUPPLIED].sum(axis=1)
         taken = rows[:, _LOST] - rows[:, _FRICTION]
-        energies = supplied, taken, supplied - taken
-        values = np.column_stack([rows[:, _POSITION], rows[:, _VELOCITY], *energies])
+        moved = *rows[:, _POSITION].T, *rows[:, _VELOCITY].T
+        total = self._count + len(rows)
         # Mean and squares of two parts are merged without a difference of large numbers.
-        total = self._count + len(values)
-        mean = values.mean(axis=0)
-        change = mean - self._means
-        self._squares += ((values - mean) ** 2).sum(axis=0)
-        self._squares += change**2 * (self._count * len(values) / total)
-        self._means += change * (len(values) / total)
+        for i, values in enumerate((*moved, supplied, taken, supplied - taken)):
+            mean = values.mean()
+            change = mean - self._means[i]
+            self._squares[i] += ((values - mean) ** 2).sum()
+            self._squares[i] += change**2 * (self._count * len(rows) / total)
+            self._means[i] += change * (len(rows) / total)
         self._count = total
 
     def statistics(self, samples: int) -> SegmentStatistics:
