@@ -82,17 +82,28 @@ def test_data_types(tmp_path: Path, code: str) -> None:
     assert raw.has_units
 
 
+@pytest.mark.parametrize("z_type", "IA")
 @pytest.mark.parametrize("code", "IL")
-def test_incremental_integer_heights_are_offset_plus_increment_times_stored(
-    tmp_path: Path, code: str
+def test_integer_heights_are_offset_plus_increment_times_stored(
+    tmp_path: Path, code: str, z_type: str
 ) -> None:
+    """Increment is the multiplier of integers on any axis (schema of ISO 25178-72)."""
     stored = np.arange(-6.0, 6.0).reshape(3, 4)
-    spec = X3pSpec(stored, code=code, z_type="I", z_increment="1e-9", z_offset="2e-6")
-    np.testing.assert_allclose(read_spec(tmp_path, spec).heights, 2e-6 + 1e-9 * stored, rtol=1e-14)
+    spec = X3pSpec(stored, code=code, z_type=z_type, z_increment="1e-9", z_offset="2e-6")
+    raw = read_spec(tmp_path, spec)
+    np.testing.assert_allclose(raw.heights, 2e-6 + 1e-9 * stored, rtol=1e-14)
+    assert raw.notes == ()
 
 
-@pytest.mark.parametrize("code", "ILFD")
-def test_absolute_heights_ignore_the_increment(tmp_path: Path, code: str) -> None:
+@pytest.mark.parametrize("code", "IL")
+def test_integer_heights_of_an_absolute_axis_without_increment(tmp_path: Path, code: str) -> None:
+    stored = np.arange(-6.0, 6.0).reshape(3, 4)
+    spec = X3pSpec(stored, code=code, z_increment="", z_offset="2")
+    np.testing.assert_array_equal(read_spec(tmp_path, spec).heights, 2 + stored)
+
+
+@pytest.mark.parametrize("code", "FD")
+def test_absolute_floats_ignore_the_increment(tmp_path: Path, code: str) -> None:
     stored = np.rint(HEIGHTS)
     spec = X3pSpec(stored, code=code, z_type="A", z_increment="0.5", z_offset="100")
     raw = read_spec(tmp_path, spec)
@@ -209,6 +220,11 @@ def test_absolute_lateral_axes(tmp_path: Path) -> None:
     sheared = 4e-6 * x + 1e-6 * y
     assert_refused(tmp_path, replace(spec, x_positions=sheared), "CX is absolute.*no uniform grid")
     assert_refused(tmp_path, replace(spec, x_positions=-x), "do not increase")
+    counts = replace(spec, x_positions=4.0 * x, y_positions=5.0 * y, position_code="L")
+    counts = replace(counts, x_increment="1e-6", y_increment="1e-6")
+    assert read_spec(tmp_path, counts).pitch == pytest.approx((4e-6, 5e-6), rel=1e-9)
+    shifted = replace(counts, x_positions=np.array([0.0, 4.0, 10.0, 12.0, 16.0]) + 0.0 * x)
+    assert_refused(tmp_path, shifted, "CX is absolute.*no uniform grid")
 
 
 @pytest.mark.parametrize(
@@ -232,6 +248,7 @@ def test_absolute_lateral_axes(tmp_path: Path) -> None:
         ({"y_increment": ""}, "CY is incremental but has no Increment"),
         ({"z_offset": "x"}, "CZ Offset is 'x'"),
         ({"code": "I", "z_type": "I", "z_increment": "0"}, "CZ Increment is 0"),
+        ({"code": "I", "z_increment": "-1e-9"}, "CZ Increment is -1e-9; it must be positive"),
         ({"x_type": "Q"}, "CX has AxisType 'Q'"),
         ({"root": "gpx"}, "root <gpx>"),
         ({"with_main": False}, "without a main.xml"),

@@ -28,6 +28,7 @@ class X3pSpec:
     y_increment: str = "3e-6"
     x_positions: NDArray[np.float64] | None = None  # of an absolute axis, one per point
     y_positions: NDArray[np.float64] | None = None
+    position_code: str = "D"
     feature: str = "SUR"
     size: tuple[str, str, str] | None = None
     folder: str = ""
@@ -54,7 +55,7 @@ def point_bytes(spec: X3pSpec) -> bytes:
     for kind, positions in ((spec.x_type, spec.x_positions), (spec.y_type, spec.y_positions)):
         if kind == "A":
             assert positions is not None
-            columns.append(positions.ravel().astype("<f8"))
+            columns.append(positions.ravel().astype(STORED[spec.position_code]))
     columns.append(spec.stored.ravel().astype(STORED[spec.code]))
     content = b"".join(column[k].tobytes() for k in range(spec.stored.size) for column in columns)
     return content[: len(content) - spec.cut]
@@ -90,8 +91,8 @@ def main_xml(spec: X3pSpec, points: bytes, valid: bytes | None) -> bytes:
     text = (
         f"{spec.prolog}<{spec.root} xmlns:p='http://www.opengps.eu/2008/ISO5436_2'>"
         f"<Record1><Revision>{spec.revision}</Revision><FeatureType>{spec.feature}</FeatureType>"
-        f"<Axes>{_axis('CX', spec.x_type, 'D', spec.x_increment, '0')}"
-        f"{_axis('CY', spec.y_type, 'D', spec.y_increment, '0')}"
+        f"<Axes>{_axis('CX', spec.x_type, spec.position_code, spec.x_increment, '0')}"
+        f"{_axis('CY', spec.y_type, spec.position_code, spec.y_increment, '0')}"
         f"{_axis('CZ', spec.z_type, spec.code, spec.z_increment, spec.z_offset)}"
         f"{spec.rotation}</Axes></Record1>"
         f"<Record2><Date>{spec.date}</Date></Record2>"

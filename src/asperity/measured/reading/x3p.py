@@ -32,9 +32,9 @@ _MAX_XML = 64 * 2**20
 def read_x3p(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
     """Read an X3P surface or profile.
 
-    Heights are offset + increment * stored for an incremental height axis, and offset + stored
-    for an absolute one, whatever their data type. A point is missing where its height is NaN
-    or its validity bit is 0.
+    Heights are offset + increment * stored for an incremental height axis and for integers (where
+    the increment is 1 if it is not stated), and offset + stored for floats on an absolute axis. A
+    point is missing where its height is NaN or its validity bit is 0.
 
     Returns:
         Heights [m], pitch [m] and notes on peculiarities of the file.
@@ -150,7 +150,7 @@ def _md5(content: bytes) -> str:
 class CoordinateAxis:
     """A coordinate axis: a coordinate is offset + factor * stored number.
 
-    The data of an absolute axis are in metres: its increment is ignored, with a note.
+    Floats of an absolute axis are in metres: its increment is ignored, with a note.
     """
 
     name: str
@@ -261,12 +261,14 @@ def _parse_axis(root: ET.Element, name: str, notes: list[str]) -> CoordinateAxis
         raise SurfaceFileError(f"{name} is incremental but has no Increment")
     increment = parse_number(text or "1", f"{name} Increment")
     offset = parse_number(_text(root, f"{path}/Offset") or "0", f"{name} Offset")
-    if incremental and increment <= 0:
+    dtype = np.dtype(DTYPES[code])
+    is_scaled = incremental or dtype.kind == "i"
+    if is_scaled and increment <= 0:
         raise SurfaceFileError(f"{name} Increment is {text}; it must be positive [m]")
-    if not incremental and increment != 1.0:
-        notes.append(f"{name} Increment {text} ignored: the axis is absolute, in metres")
+    if not is_scaled and increment != 1.0:
+        notes.append(f"{name} Increment {text} ignored: floats of an absolute axis are in metres")
         increment = 1.0
-    return CoordinateAxis(name, incremental, np.dtype(DTYPES[code]), increment, offset)
+    return CoordinateAxis(name, incremental, dtype, increment, offset)
 
 
 def _parse_shape(root: ET.Element, is_profile: bool) -> tuple[int, int]:
@@ -339,7 +341,7 @@ def _find_step(
     if not np.all(np.diff(low) > 0):
         raise SurfaceFileError(f"{axis.name} is absolute and its positions do not increase")
     is_whole = axis.dtype.kind == "i"
-    resolution = 1.0 if is_whole else float(np.finfo(axis.dtype).eps * np.abs(low).max())
+    resolution = axis.factor if is_whole else float(np.finfo(axis.dtype).eps * np.abs(low).max())
     result = measure_spacing(low, resolution)
     deviation = max(result.deviation, float(np.max(high - low)))
     if not result.is_uniform or np.max(high - low) > 1e-3 * result.step:
