@@ -253,12 +253,14 @@ class Spacing:
 
     Attributes:
         step: (last - first) / (n - 1), in the unit of the positions.
-        deviation: largest distance from the uniform grid through first and last.
-        index: position with this deviation.
+        median: median distance of two neighbours; a lost sample does not change it.
+        deviation: largest difference of such a distance from the median.
+        index: first of the two neighbours with this difference.
         is_uniform: whether rounding explains every deviation.
     """
 
     step: float
+    median: float
     deviation: float
     index: int
     is_uniform: bool
@@ -287,13 +289,15 @@ def measure_spacing(positions: FloatArray, resolution: FloatArray | float) -> Sp
     index = np.arange(n, dtype=np.float64)
     step = float(positions[-1] - positions[0]) / (n - 1)
     offset = positions - (positions[0] + step * index)
-    worst = int(np.argmax(np.abs(offset)))
+    distances = np.diff(positions)
+    median = float(np.median(distances))
+    deviations = np.abs(distances - median)
     half = np.broadcast_to(np.asarray(resolution, dtype=np.float64) / 2, (n,))
-    if float(half.max()) * 2 > _COARSE_FRACTION * float(np.median(np.diff(positions))):
+    if float(half.max()) * 2 > _COARSE_FRACTION * median:
         half = np.zeros(n)
     half = np.maximum(half, _TOLERANCE * step)
     uniform = _min_excess(offset, index, half) <= _TOLERANCE * step
-    return Spacing(step, float(abs(offset[worst])), worst, uniform)
+    return Spacing(step, median, float(deviations.max()), int(deviations.argmax()), uniform)
 
 
 def _min_excess(offset: FloatArray, index: FloatArray, half: FloatArray) -> float:

@@ -195,13 +195,17 @@ def test_nonuniform_sampling_is_refused(tmp_path: Path) -> None:
     true = 0.15625 * np.arange(200)
     true[150:] += 0.3  # a gap of three digits
     text = "x [mm],z [um]\n" + "".join(f"{x:.1f},{k}\n" for k, x in enumerate(true))
-    assert_refused(tmp_path, text, r"not uniform: line 1[45]. is .* m from a grid")
+    assert_refused(
+        tmp_path, text, "not uniform: the step to line 152 differs by .* from the median"
+    )
     text = "x [m] z [m]\n0.000 1\n0.100 1\n0.203 1\n0.300 1\n"
-    assert_refused(tmp_path, text, "not uniform: line 4 is 0.003 m")
+    assert_refused(tmp_path, text, "step to line [45] differs by 3 mm from the median of 100 mm")
     # A lost sample is not rounding, even if positions are printed as coarsely as the step.
     indices = [k for k in range(8) if k != 4]
     text = "x [m] z [m]\n" + "\n".join(f"{k} 1" for k in indices)
-    assert_refused(tmp_path, text, "not uniform")
+    assert_refused(tmp_path, text, "the step to line 6 differs by 1 m from the median of 1 m")
+    text = "x [um] z [m]\n" + "\n".join(f"{-2 * k} 1" for k in indices)
+    assert_refused(tmp_path, text, "the step to line 6 differs by 2 µm from the median of 2 µm")
 
 
 def test_spacing_accepts_rounded_grids_and_refuses_gaps() -> None:

@@ -39,7 +39,10 @@ def test_points_on_one_line_are_a_profile(tmp_path: Path) -> None:
     [
         (["0 0 1", "1 0.3 2", "2 0.7 3", "3.5 0.9 4", "4 1 5"], "no regular grid"),
         ([*point_lines(), "0.5 2 77"], "same position"),
-        ([*point_lines(), "2.7 2 1", "2.7 3 1", "2.7 4 1", "2.7 5 1"], "positions are not uniform"),
+        (
+            [*point_lines(), "2.7 2 1", "2.7 3 1", "2.7 4 1", "2.7 5 1"],
+            "not uniform: a step differs by",
+        ),
         (["nan 0 1", *point_lines()], "position is missing"),
     ],
 )

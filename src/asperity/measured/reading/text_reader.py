@@ -11,6 +11,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured import reader
+from asperity.measured.lengths import format_length
 from asperity.measured.reading import text_header
 from asperity.measured.reading.text_table import TextTable, find_table
 
@@ -149,13 +150,15 @@ def _read_profile(table: TextTable, units: list[float], name: str) -> reader.Raw
         lines = lines[::-1]
         notes = ("positions decrease: the profile is reversed",)
     result = reader.measure_spacing(positions, resolution)
-    pitch = result.step * units[0]
     if not result.is_uniform:
+        line = max(lines[result.index], lines[result.index + 1])
+        deviation = format_length(result.deviation * units[0])
+        median = format_length(result.median * units[0])
         raise SurfaceFileError(
-            f"sampling is not uniform: line {lines[result.index]} is"
-            f" {result.deviation * units[0]:.3g} m from a grid of {pitch:.3g} m;"
-            f" {reader.INTERPOLATE}"
+            f"sampling is not uniform: the step to line {line} differs by {deviation} from the"
+            f" median of {median}; {reader.INTERPOLATE}"
         )
+    pitch = result.step * units[0]
     return reader.RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes)
 
 
@@ -273,6 +276,6 @@ def _grid_step(axis: str, positions: FloatArray, resolution: FloatArray) -> floa
         return 0.0
     result = reader.measure_spacing(positions, float(resolution.max()))
     if not result.is_uniform:
-        fault = f"one is {result.deviation:.3g} from a grid of {result.step:.3g}"
+        fault = f"a step differs by {result.deviation:.3g} from the median of {result.median:.3g}"
         raise SurfaceFileError(f"the {axis} positions are not uniform: {fault}; {_NO_GRID}")
     return result.step
