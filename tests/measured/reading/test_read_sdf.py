@@ -87,14 +87,15 @@ def test_integer_markers_of_missing_points(tmp_path: Path, kind: int, marker: fl
 
 
 @pytest.mark.parametrize(("kind", "type_"), [(3, np.float32), (7, np.float64)])
-def test_lowest_float_and_nan_mark_missing_points(
+def test_greatest_floats_and_nan_mark_missing_points(
     tmp_path: Path, kind: int, type_: type[np.floating]
 ) -> None:
     stored = STORED.copy()
     stored[1, 2] = np.finfo(type_).min
+    stored[2, 1] = np.finfo(type_).max
     stored[0, 0] = np.nan
     raw = read_binary(tmp_path, SdfSpec(stored, kind=kind))
-    assert np.argwhere(np.isnan(raw.heights)).tolist() == [[0, 0], [1, 2]]
+    assert np.argwhere(np.isnan(raw.heights)).tolist() == [[0, 0], [1, 2], [2, 1]]
 
 
 def test_olympus_header_with_eight_extra_bytes(tmp_path: Path) -> None:

@@ -83,7 +83,8 @@ _HEADER_1 = struct.Struct("<8s10s12s12sHHddddBBB")
 _HEADER_2 = struct.Struct("<8s10s12s12sIIddddBBB")
 _OLYMPUS_PADDING = 8  # bytes that Olympus adds to the header of bISO-1.0 files (sdfile.c)
 
-# By type code: NumPy type of a height, and the value of a missing point.
+# By type code: NumPy type of a height, and the value of a missing point; its negative, which is no
+# height of the type or the other end of the floats, marks one too.
 _DATA_TYPES = (
     ("u1", math.nan),
     ("<u2", 65535.0),
@@ -127,7 +128,7 @@ def read_sdf(file: reader.SurfaceFile, _options: reader.ReadingOptions) -> reade
     """Read a surface data file.
 
     A height is Zscale times the stored number. A point is missing if the text has "BAD" or the
-    number is the one that its data type reserves. Profiles have the order of the file.
+    number is one that its data type reserves. Profiles have the order of the file.
 
     Raises:
         SurfaceFileError: not an SDF that can be read, with the reason.
@@ -138,7 +139,11 @@ def read_sdf(file: reader.SurfaceFile, _options: reader.ReadingOptions) -> reade
     content = file.content
     parse = _parse_binary if _BINARY_SIGNATURE.match(content) else _parse_text
     header, stored = parse(content)
-    stored, notes = reader.mask_missing(stored, _DATA_TYPES[header.data_type][1])
+    notes: tuple[str, ...] = ()
+    code = _DATA_TYPES[header.data_type][1]
+    for marker in (code, -code):
+        stored, found = reader.mask_missing(stored, marker)
+        notes += found
     with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by the caller
         heights = stored * header.z_scale
     if header.profiles == 1:
