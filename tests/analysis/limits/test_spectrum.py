@@ -10,7 +10,9 @@ import pytest
 from asperity.analysis.energy.straight_scan import parallel_line_points
 from asperity.analysis.limits import spectrum as module
 from asperity.analysis.limits.spectrum import Spectrum, band_variances, compute_spectrum, tip_gain
+from asperity.analysis.limits.wave_scan import wave_forces
 from asperity.scene import load_scene
+from asperity.surface import Surface
 from asperity.textures import Fourier, Grating, HeightMap, Noise, NoiseProfile, Profile, Sinusoid
 from asperity.textures.kinds.prepare_synthetic import prepare_texture
 
@@ -141,10 +143,38 @@ def test_spectrum_has_the_variance_of_the_heights(ny: int, nx: int, periodic: bo
         texture = Profile(heights[0], 1e-5, periodic=periodic)
     else:
         texture = HeightMap(heights, (1e-5, 3e-5), periodic=periodic)
-    expected = np.var(heights) if periodic else hann_variance(heights)
     spectrum = compute_spectrum(texture)
-    assert total_variance(spectrum) == pytest.approx(expected, rel=1e-10)
+    assert total_variance(spectrum) == pytest.approx(np.var(heights), rel=1e-10, abs=0.0)
     assert sum(wave.share for wave in spectrum.waves) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [4, 5, 8, 16])
+def test_one_period_of_a_sinusoid_has_its_variance(count: int) -> None:
+    heights = 1e-6 * np.sin(2 * np.pi * np.arange(count) / count)
+    spectrum = compute_spectrum(Profile(heights, 1e-3 / count))
+    assert total_variance(spectrum) == pytest.approx(0.5e-12, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("periods", [2.5, 4.2, 10.0, 33.3])
+@pytest.mark.parametrize("phase", [0.0, 0.8, 1.57])
+def test_sinusoid_that_is_cut_off_has_its_amplitude(periods: float, phase: float) -> None:
+    angles = 2 * np.pi * periods * np.arange(2000) / 2000
+    spectrum = compute_spectrum(Profile(3e-6 * np.sin(angles + phase), 5e-6))
+    assert math.sqrt(2.0 * total_variance(spectrum)) == pytest.approx(3e-6, rel=0.02)
+
+
+def test_a_patch_counts_the_same_wherever_it_is() -> None:
+    """1 mm of waves of 0.2 mm in a profile of 10 mm."""
+    x = np.arange(2000) * 5e-6
+    largest = []
+    for centre in (0.5e-3, 2e-3, 5e-3, 9e-3):
+        near = np.abs(x - centre) < 0.5e-3
+        texture = Profile(np.where(near, 5e-6 * np.sin(2 * np.pi * x / 0.2e-3), 0.0), 5e-6)
+        spectrum = compute_spectrum(texture)
+        assert total_variance(spectrum) == pytest.approx(1.25e-12, rel=1e-6, abs=0.0)
+        surface = Surface(texture, "C", stiffness=500.0, max_depth=20e-6)
+        largest.append(wave_forces(surface, spectrum).max())
+    assert max(largest) < 1.2 * min(largest)
 
 
 def test_wave_on_a_finite_map_has_its_wavelength_and_amplitude() -> None:
@@ -206,6 +236,13 @@ def test_band_variances_do_not_depend_on_the_block_size(monkeypatch: pytest.Monk
     np.testing.assert_array_equal(parts.number, whole.number)
     np.testing.assert_allclose(parts.variance, whole.variance, rtol=1e-12)
     np.testing.assert_allclose(parts.wavelength, whole.wavelength, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("ny", "nx"), [(31, 40), (32, 32), (1, 57)])
+def test_band_variances_of_a_window_have_its_variance(ny: int, nx: int) -> None:
+    heights = np.random.default_rng(5).normal(size=(ny, nx)) * 1e-5 + 3e-4
+    bands = band_variances(heights[None], (1e-5, 3e-5), False)
+    assert bands.variance.sum() == pytest.approx(hann_variance(heights), rel=1e-10, abs=0.0)
 
 
 def test_band_variances_of_components_are_added() -> None:

@@ -2,7 +2,8 @@
 
 A sum of plane waves is decomposed exactly, wave by wave. A profile or a map is decomposed by its
 periodogram, a map radially: every bin counts by its wavelength in any direction. The bins of a
-third of an octave form one wave, with the amplitude of the sinusoid of the same variance.
+third of an octave form one wave, with the amplitude of the sinusoid of the same variance. Heights
+that do not repeat are windowed, and the waves scaled to carry the variance of the heights.
 """
 
 from __future__ import annotations
@@ -66,7 +67,8 @@ class Spectrum(Serializable):
         waves: the waves.
         exact: whether they are the waves of a sum, not bands of a periodogram.
         is_radial: whether bands are those of a map.
-        is_windowed: whether the heights do not repeat, and were windowed (Hann).
+        is_windowed: whether the heights do not repeat, and were windowed (Hann); the amplitudes are
+            scaled to the variance of the heights.
     """
 
     waves: tuple[Wave, ...] = field(metadata=OMITTED)
@@ -133,15 +135,15 @@ def _compute_spectrum(texture: Texture) -> Spectrum:
         return Spectrum(plane_waves, exact=True)
     heights, spacing, repeats = texture.samples()
     bands = band_variances(heights[None], spacing, repeats)
-    total = float(bands.variance.sum())
+    # A window weighs the middle most: it decides the shares, not the variance.
+    total = float(np.var(heights))
     # The variance of a constant height is rounding.
     if total <= 1e-24 * float(np.max(np.abs(heights)) ** 2):
         return Spectrum((), exact=False)
     waves = []
-    for length, variance in zip(bands.wavelength, bands.variance, strict=True):
-        if variance > _TRANSFORM_ROUNDING * total:
-            amplitude = math.sqrt(2.0 * variance)
-            waves.append(Wave(float(length), amplitude, float(variance) / total))
+    for length, share in zip(bands.wavelength, bands.variance / bands.variance.sum(), strict=True):
+        if share > _TRANSFORM_ROUNDING:
+            waves.append(Wave(float(length), math.sqrt(2.0 * share * total), float(share)))
     return Spectrum(tuple(waves), False, not texture.is_profile, not repeats)
 
 
