@@ -363,6 +363,10 @@ def test_nothing_is_felt_at_frequencies_without_thresholds() -> None:
         assert (texture.level == 0.0) is (speed == 0.1)
     slow = compare(Sinusoid(50e-6, 10e-3), "touch", "C")
     assert slow.tier == "unknown"
+    text = masking_text(slow.rows[0].perceptibility)
+    assert text.endswith(
+        "where waves of it are, no threshold is known; their harmonics are not counted"
+    )
     assert slow.rows[0].perceptibility.remedies[0].kind == "speed"
     # A second wave within the thresholds decides, whatever the first one is.
     both = Fourier([50e-6, 20e-6], [[200.0 * math.pi, 0.0], [2000.0 * math.pi, 0.0]], [0.0, 0.0])

@@ -4,7 +4,7 @@ The texture force is the oscillating force of a straight scan, without form and 
 waves that the device resolves at that speed; friction that varies along the scan is part of it.
 Each wave moves the apparent mass of the device and the hand that holds it (docs/theory/limits.md);
 the amplitude of this motion is compared with the detection thresholds of the grip at the frequency
-of the wave.
+of the wave, its harmonics too.
 """
 
 from __future__ import annotations

@@ -113,7 +113,7 @@ def masking_text(texture: Perceptibility) -> str:
     if texture.tier == "unknown":
         return (
             f"it moves the held tool by {motion}, but {unknown_frequencies_text(texture)}, where "
-            "its waves are, no threshold is known"
+            "waves of it are, no threshold is known; their harmonics are not counted"
         )
     place = "in waves that it resolves"
     if texture.level:
