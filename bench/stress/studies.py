@@ -119,6 +119,7 @@ def coverage(study: Callable[[int], Iterator[Interval]], count: int) -> tuple[fl
     found = np.array([one for seed in range(count) for one in study(seed)])
     truth, estimate, low, high = found.T
     held = (low <= truth) & (truth <= high)
+    estimate = np.where(np.isfinite(estimate), estimate, np.where(estimate < 0.0, high, low))
     halved = (truth >= (low + estimate) / 2.0) & (truth <= (high + estimate) / 2.0)
     return float(held.mean()), float(halved.mean()), len(found)
 

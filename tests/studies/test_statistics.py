@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.studies.study_cases import answers, design_of
+from tests.studies.study_cases import AMPLITUDE, answers, design_of
 
-from asperity.studies.methods import covariance, fit_scores, pseudo_values
-from asperity.studies.scores import mean_interval
+from asperity.studies.methods import METHODS, covariance, fit_scores, pseudo_values
+from asperity.studies.scores import Interval, Score, mean_interval
+from asperity.studies.simulated_participants import Observer, simulate_run
 from asperity.studies.thresholds import LogLevels, Staircase
 
 # American League 1987: games won (rows) against each other team (columns), in the order
@@ -128,11 +130,76 @@ def test_answers_that_say_nothing_give_unbounded_intervals() -> None:
     assert high < math.log(1e-4)
 
 
+def test_thresholds_outside_the_levels_are_no_numbers() -> None:
+    lowest, highest = LEVELS.ends
+    right = np.arange(40) % 2 == 0
+    assert LEVELS.estimate_threshold(np.full(40, highest), right) == (math.inf, highest, math.inf)
+    below = LEVELS.estimate_threshold(np.full(40, lowest), np.ones(40, bool))
+    assert below == (-math.inf, -math.inf, lowest)
+
+
 def test_a_wrong_answer_is_possible_without_lapses() -> None:
     levels = LogLevels(1e-6, 1e-4, 1e-12, 0.0, guess=0.5, lapse=0.0)
     x = np.linspace(*levels.ends, 20)
-    estimates = levels.estimate_threshold(x, x < x[-1])
-    assert math.isfinite(estimates[0])
+    assert math.isfinite(levels.estimate_threshold(x, x < x[-1])[2])
+
+
+def pooled_thresholds(middle: float, seed: int, **observer: float) -> tuple[Interval, Interval]:
+    """Return the pooled threshold and the ratio of two equal conditions, of six participants."""
+    design = replace(design_of("detection", trials=20), factors={"surface.law": ("A", "C")})
+    rng = np.random.default_rng(seed)
+    answered = {}
+    for number in range(6):
+        person = Observer(**{"threshold": float(np.exp(0.3 * rng.standard_normal())), **observer})
+        answered[str(number)] = simulate_run(
+            design, number, person, lambda values: values[AMPLITUDE] / middle, seed
+        )
+    score = METHODS["detection"].score(design, answered)
+    return score.pool(0)[0], score.differences(0)[0]
+
+
+@pytest.mark.parametrize(
+    ("middle", "observer"), [(1e-3, {}), (3e-7, {}), (1e-5, {"slope": 0.0, "lapse": 1.0})]
+)
+def test_pooled_thresholds_outside_the_levels_are_open(middle: float, observer: dict) -> None:
+    for seed in range(5):
+        (threshold, low, high), ratio = pooled_thresholds(middle, seed, **observer)
+        assert not math.isfinite(threshold)
+        assert low == -math.inf or (middle > 1e-6 and low <= math.log(1e-4))
+        assert high == math.inf or (middle < 1e-6 and high >= math.log(1e-6))
+        assert not math.isfinite(ratio[0])
+        assert ratio[1:] == (-math.inf, math.inf)
+
+
+def test_pooled_thresholds_within_the_levels_hold_the_truth() -> None:
+    held = bounded = 0
+    for seed in range(40):
+        (_, low, high), (_, least, greatest) = pooled_thresholds(1e-5, seed)
+        held += (low <= math.log(1e-5) <= high) + (least <= 0.0 <= greatest)
+        bounded += math.isfinite(low) and math.isfinite(high)
+    assert held_at_least(held, 80)
+    assert bounded >= 24
+
+
+def test_an_end_is_open_for_one_beyond_it_or_half_without_an_end() -> None:
+    def pool(*people: Interval) -> Interval:
+        estimates = np.array(people).T[:, :, None]
+        counts = np.full((len(people), 1), 20)
+        return Score("threshold", ("P",) * len(people), estimates, counts, limits=(-1.0, 1.0)).pool(
+            0
+        )[0]
+
+    known = [(0.1 * number, -0.9, 0.9) for number in range(4)]
+    mean, low, high = pool(*known)
+    assert pool(*known[1:], (0.0, -0.9, math.inf)) == pytest.approx((mean, low, high))
+    assert pool(*known[2:], (0.0, -0.9, math.inf), (0.1, -math.inf, math.inf)) == pytest.approx(
+        (mean, low, math.inf)
+    )
+    mean, low, high = pool(*known, (math.inf, 0.9, math.inf))
+    assert math.isnan(mean)
+    assert low == pytest.approx(mean_interval(np.array([0.0, 0.1, 0.2, 0.3, 1.0]))[1])
+    assert high == math.inf
+    assert pool(*known, (math.nan, -math.inf, math.inf)) == pool(*known)  # gave no answers
 
 
 @pytest.mark.parametrize("count", [5, 12])
@@ -156,8 +223,6 @@ def test_intervals_of_few_or_equal_values_are_unbounded() -> None:
 
 
 def test_thresholds_of_laws_come_out() -> None:
-    from asperity.studies.methods import METHODS
-
     design = design_of("detection", trials=400)
     score = METHODS["detection"].score(design, {"P": answers(design)})
     assert np.exp(score.values[0]) == pytest.approx([5e-6, 1e-5, 1e-5, 1e-5], rel=0.2)
@@ -168,8 +233,6 @@ def test_thresholds_of_laws_come_out() -> None:
 
 def test_bayesian_thresholds_come_out() -> None:
     pytest.importorskip("SweetSpot", reason="not run: no SweetSpot here")
-    from asperity.studies.methods import METHODS
-
     design = design_of("detection", procedure="bayesian", trials=60)
     score = METHODS["detection"].score(design, {"P": answers(design)})
     assert np.exp(score.values[0]) == pytest.approx([5e-6, 1e-5, 1e-5, 1e-5], rel=0.5)

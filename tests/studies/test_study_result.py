@@ -13,7 +13,6 @@ from tests.studies.study_cases import AMPLITUDE, design_of, records
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
-from asperity.studies import study_report  # noqa: F401  # registers the report of results
 from asperity.studies.design import TrialRecord
 from asperity.studies.methods import METHODS
 from asperity.studies.simulated_participants import (
@@ -23,6 +22,7 @@ from asperity.studies.simulated_participants import (
     plan,
     surface_strength,
 )
+from asperity.studies.study_report import study_page
 from asperity.studies.study_result import analyse
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
@@ -202,6 +202,42 @@ def test_studies_whose_participants_are_all_excluded(kind: str) -> None:
     result = analyse(design, records(design, 3))
     assert len(result.excluded) == 3
     assert "no participant is used" in result.to_html()
+
+
+@pytest.mark.parametrize(
+    ("observer", "words"),
+    [({"slope": 0.0, "lapse": 1.0}, "above 100 µm"), ({"threshold": 0.01}, "below 1 µm")],
+)
+def test_reports_of_thresholds_outside_the_levels(
+    observer: dict, words: str, tmp_path: Path
+) -> None:
+    design = replace(design_of("detection", trials=20), unit="m")
+    result = analyse(design, records(design, 4, **observer))
+    rows = result.to_dict()["rows"]
+    assert sum(row["outside levels"] == words for row in rows) >= 14  # of 16, and pooled ones
+    for row in rows:
+        assert (row["estimate"] is None) == bool(row["outside levels"]) or "ratio" in row[
+            "quantity"
+        ]
+    pooled = [row for row in rows if row["participant"] == "pooled"]
+    assert not any(row["estimate"] for row in pooled)
+    assert [row["unit"] for row in pooled] == ["m"] * 4 + [""] * 3
+    answer = study_page(result).answer
+    assert answer.startswith("threshold of texture.amplitude: A ")
+    assert answer.endswith("; 4 participants.")
+    assert f"C {words} (" in answer
+    assert f"C {words} (" in result.to_html()
+    result.to_csv(tmp_path / "table.csv")
+    assert f",{words}," in (tmp_path / "table.csv").read_text("utf-8")
+
+
+def test_thresholds_and_onsets_have_units() -> None:
+    for kind, unit, prefix in (("detection", "m", "µm"), ("onset", "N/m", "N/m")):
+        design = replace(design_of(kind), unit=unit)
+        result = analyse(design, records(design, 4))
+        assert f" {prefix} (" in study_page(result).answer
+        assert f" {prefix} to " in study_page(result).answer
+        assert f"{result.score.quantity} [{unit}]" in result.to_html()
 
 
 def test_figures_have_data_for_narrow_windows_and_legends() -> None:

@@ -67,6 +67,7 @@ class StudyDesign:
         question: the question that participants answer.
         seed: seed of all random choices.
         participants: number of participants that are planned.
+        unit: SI unit of the level of the method; empty for a pure number.
     """
 
     kind: str
@@ -75,6 +76,7 @@ class StudyDesign:
     question: str = ""
     seed: int = 0
     participants: int = 1
+    unit: str = ""
 
     @property
     def conditions(self) -> tuple[dict[str, Any], ...]:

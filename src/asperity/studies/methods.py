@@ -289,7 +289,9 @@ def score_onset(design: StudyDesign, answered: Answers) -> Score:
 
     cells = score_cells(answered, len(design.conditions), estimate)
     interval = "Student's t over pairs of series"
-    return Score(f"onset of {key}", *cells, is_logarithmic=True, interval=interval)
+    return Score(
+        f"onset of {key}", *cells, is_logarithmic=True, interval=interval, unit=design.unit
+    )
 
 
 @dataclass(frozen=True)

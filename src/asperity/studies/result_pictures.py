@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from asperity.core.compiled import FloatArray
 from asperity.report.pictures import style
 from asperity.studies.design import TrialRecord, describe_source
+from asperity.studies.scores import Score
 from asperity.studies.study_result import StudyResult, label_text
 from asperity.studies.thresholds import level_answers, log_levels
 
@@ -27,14 +28,14 @@ def scores_figure(result: StudyResult) -> Figure:
     figure, axes = style.new_axes(7.0, 1.2 + 0.45 * len(labels))
     score = result.included_score
     places = np.arange(len(labels))
-    values = score.to_scale(score.values)
+    values = _to_axis(score, score.values)
     offsets = np.linspace(-0.3, -0.1, len(values))
     for name, row, offset in zip(score.participants, values, offsets, strict=True):
         axes.plot(row, places + offset, "o", color=_FAINT, markersize=3, label=f"_{name}")
     axes.plot([], [], "o", color=_FAINT, markersize=3, label="a participant")
     axes.plot([], [], "s-", color=_STRONG, label="mean and its 95 % interval")
     for place, interval in enumerate(np.array(result.pooled)):
-        value, *ends = score.to_scale(interval)
+        value, *ends = _to_axis(score, interval)
         axes.plot(value, place, "s", color=_STRONG, label=f"_mean of {labels[place]}")
         if np.all(np.isfinite(interval)):
             axes.plot(ends, [place, place], color=_STRONG, linewidth=2)
@@ -45,8 +46,14 @@ def scores_figure(result: StudyResult) -> Figure:
     axes.set_yticks(places, labels)
     axes.invert_yaxis()
     style.add_legend(figure, loc="outside lower left", ncols=3)
-    style.label_axes(axes, f"{score.quantity}{_source(result)}", "")
+    unit = f" [{score.unit}]" if score.unit else ""
+    style.label_axes(axes, f"{score.quantity}{unit}{_source(result)}", "")
     return figure
+
+
+def _to_axis(score: Score, values: FloatArray) -> FloatArray:
+    """Return values on the scale of the quantity; what is unbounded is not drawn."""
+    return score.to_scale(np.where(np.isfinite(values), values, np.nan))
 
 
 def functions_figure(result: StudyResult) -> Figure:

@@ -84,6 +84,10 @@ RESAMPLES = 2000
 """Number of samples of a bootstrap, unless stated otherwise."""
 
 
+_OPPOSITE = [0, 2, 1, 3]
+"""Places of value, ends and value within the limits in what is subtracted."""
+
+
 @dataclass(frozen=True)
 class Score:
     """Estimates for each participant (row) and each condition or pair of conditions (column).
@@ -99,6 +103,8 @@ class Score:
         pooled: values whose means are the pooled estimates, where they are not ``values``; they may
             be too skewed to be resampled, as where hardly any choice goes the other way.
         chance: of a share, its value without an effect.
+        limits: of thresholds, the ends of the levels: a value outside is infinite.
+        unit: SI unit of the quantity; empty for a pure number.
     """
 
     quantity: str
@@ -109,9 +115,17 @@ class Score:
     interval: str = ""
     pooled: FloatArray | None = None
     chance: float | None = None
+    limits: tuple[float, float] | None = None
+    unit: str = ""
 
     def pool(self, seed: int, resamples: int = RESAMPLES) -> list[Interval]:
-        """Return the mean over the participants of each column, with its interval."""
+        """Return the mean over the participants of each column, with its interval.
+
+        Thresholds outside the levels count as the end of the levels, and leave the end of the
+        interval on their side unbounded, as half of the participants or more do whose own interval
+        is unbounded there. The mean is infinite if all are outside on one side, unknown (not a
+        number) if some are.
+        """
         intervals = [self._pool(column, seed, resamples) for column in self._units.T]
         if self.chance is None:
             return intervals
@@ -122,10 +136,12 @@ class Score:
 
         The differences are within participants. A column with a chance value is compared with it.
         """
-        units = self._units
+        units = self._units.T
         if self.chance is not None:
-            return [self._pool(column - self.chance, seed, resamples) for column in units.T]
-        return [self._pool(column - units[:, 0], seed, resamples) for column in units.T[1:]]
+            return [self._pool(column - self.chance, seed, resamples) for column in units]
+        with np.errstate(invalid="ignore"):  # both may be infinite
+            columns = units[1:] - units[0][:, _OPPOSITE]
+        return [self._pool(column, seed, resamples) for column in columns]
 
     @property
     def values(self) -> FloatArray:
@@ -135,11 +151,24 @@ class Score:
 
     @property
     def _units(self) -> FloatArray:
-        return self.values if self.pooled is None else self.pooled
+        """Values, ends, and values within the limits; shape (4, participants, columns)."""
+        if self.limits is not None:
+            return np.array([*self.estimates, np.clip(self.values, *self.limits)])
+        values = self.values if self.pooled is None else self.pooled
+        return np.array([values] * len(_OPPOSITE))
 
-    def _pool(self, values: FloatArray, seed: int, resamples: int) -> Interval:
-        known = values[np.isfinite(values)]
-        return mean_interval(known, resamples if self.pooled is None else 0, seed)
+    def _pool(self, column: FloatArray, seed: int, resamples: int) -> Interval:
+        """Return the mean of a column, shape (participants, 4), and its interval."""
+        values, lows, highs, inner = column[~np.isnan(column[:, 3])].T
+        mean, low, high = mean_interval(inner, resamples if self.pooled is None else 0, seed)
+        if not np.all(np.isfinite(values)):
+            mean = float(values[0]) if np.all(values == values[0]) else math.nan
+        half = len(values) / 2.0
+        if not np.all(values > -math.inf) or np.isinf(lows).sum() >= half > 0.0:
+            low = -math.inf
+        if not np.all(values < math.inf) or np.isinf(highs).sum() >= half > 0.0:
+            high = math.inf
+        return mean, low, high
 
     @property
     def pooled_interval(self) -> str:

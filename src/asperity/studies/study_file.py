@@ -116,7 +116,7 @@ def build_study(content: Mapping[str, Any], folder: Path) -> Study:
         items = parse_values(argument, ", ".join(values))
         factors[argument.name] = tuple(map(argument.parse, items))
     plan = {name: settings[name] for name in ("kind", "question", "seed", "participants")}
-    design = StudyDesign(factors=factors, options=options, **plan)
+    design = StudyDesign(factors=factors, options=options, unit=unit, **plan)
     return Study(design, sections, arguments, folder.resolve(), settings, content)
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asperity.core.units import count_text
+from asperity.core.units import count_text, format_quantity
 from asperity.report.document.page import (
     Cell,
     Media,
@@ -33,7 +33,7 @@ from asperity.studies.study_store import find_derived_files, read_study, read_tr
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BARS = "Bars are 95 % intervals; an end that the data do not bound is left out."
+_BARS = "Bars are 95 % intervals; what the data do not bound is left out."
 _FUNCTIONS = "Share of right answers over the level, with the fitted psychometric functions"
 # Titles of the sections of a study file that the page repeats.
 _FACTS = {
@@ -106,43 +106,44 @@ def _rows_of(result: StudyResult, participant: str) -> list[dict[str, Any]]:
 
 
 def _answer(result: StudyResult) -> str:
-    """Return which condition has the greatest pooled score."""
-    known = [
-        row
-        for row in _rows_of(result, POOLED)
-        if row["quantity"] == result.score.quantity and row["estimate"] is not None
-    ]
-    if not known:
-        return f"{result.score.quantity}: no participant is used."
+    """Return which condition has the greatest pooled score, or all where levels bound not all."""
+    quantity = result.score.quantity
+    rows = [row for row in _rows_of(result, POOLED) if row["quantity"] == quantity]
+    known = [row for row in rows if row["estimate"] is not None]
+    people = count_text(len(result.included), "participant")
+    if result.simulated:
+        people = f"{people}: {describe_source(result.simulated)}"
+    if not result.included:
+        return f"{quantity}: no participant is used."
+    if any(row["outside levels"] for row in rows):
+        texts = [f"{label_text(result, row)} {_interval_text(row)}".strip() for row in rows]
+        return f"{quantity}: {', '.join(texts)}; {people}."
     best = max(known, key=lambda row: row["estimate"])
     which = f", the greatest of {len(known)}" if len(known) > 1 else ""
     label = f" for {text}{which}" if (text := label_text(result, best)) else ""
-    count = len(result.included)
-    people = count_text(count, "participant")
-    if result.simulated:
-        people = f"{people}: {describe_source(result.simulated)}"
-    return f"{result.score.quantity}: {_interval_text(best)}{label}; {people}."
+    return f"{quantity}: {_interval_text(best)}{label}; {people}."
 
 
-def _number(value: float | None) -> str:
-    return NOT_AVAILABLE if value is None else f"{round(value, 10) + 0.0:.3g}"
+def _number(value: float | None, unit: str) -> str:
+    if value is None:
+        return NOT_AVAILABLE
+    return format_quantity(value, unit) if unit else f"{round(value, 10) + 0.0:.3g}"
+
+
+def _texts(row: Mapping[str, Any]) -> list[str]:
+    """Return the estimate, and the ends of its interval."""
+    estimate, *ends = [_number(row[name], row["unit"]) for name in ("estimate", "lower", "upper")]
+    return [row["outside levels"] or estimate, *ends]
 
 
 def _interval_text(row: Mapping[str, Any]) -> str:
-    low = _number(row["lower"])
-    high = _number(row["upper"])
-    return f"{_number(row['estimate'])} ({low} to {high})"
+    estimate, low, high = _texts(row)
+    return f"{estimate} ({low} to {high})"
 
 
 def _score_table(result: StudyResult) -> Table:
     cells = [
-        Row(
-            [
-                Cell(label_text(result, row) or "all", "l"),
-                *(_number(row[name]) for name in ("estimate", "lower", "upper")),
-                row["quantity"],
-            ]
-        )
+        Row([Cell(label_text(result, row) or "all", "l"), *_texts(row), row["quantity"]])
         for row in _rows_of(result, POOLED)
     ]
     headings = (", ".join(result.design.factors) or "condition", "estimate", "from", "to", "of")

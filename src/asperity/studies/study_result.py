@@ -13,7 +13,7 @@ import numpy as np
 from asperity.core.display import Reportable, TableFiles
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data
-from asperity.core.units import count_text
+from asperity.core.units import count_text, format_quantity
 from asperity.studies.design import StudyDesign, TrialRecord, describe_source
 from asperity.studies.methods import EXCLUSIONS, METHODS
 from asperity.studies.scores import Interval, Score
@@ -138,43 +138,61 @@ class StudyResult(Reportable, TableFiles):
     def iterate_rows(self) -> Iterator[dict[str, Any]]:
         """Yield a row for each participant and label, then the pooled ones, then differences.
 
-        Differences of a logarithmic quantity are ratios.
+        Differences of a logarithmic quantity are ratios. An estimate that is unknown states why in
+        ``outside levels``: above or below them, or not bounded.
         """
         score = self.score
         labels = self.labels
         for row, name in enumerate(score.participants):
             for column, label in enumerate(labels):
-                numbers = self._numbers(score.estimates[:, row, column].tolist())
                 yield {
                     "participant": name,
                     **label,
                     "quantity": score.quantity,
-                    **numbers,
+                    "unit": score.unit,
+                    **self._numbers(score.estimates[:, row, column].tolist(), score.limits),
                     "answers": int(score.counts[row, column]),
                     "interval": score.interval,
                     "excluded": self.excluded.get(name, ""),
                     "simulated": self.simulated,
                 }
         word = "ratio to the first" if score.is_logarithmic else "difference from the first"
-        compared = f"{score.quantity}, {word}", self.differences, labels[1:]
+        compared = f"{score.quantity}, {word}", "", None, self.differences, labels[1:]
         if score.chance is not None:
-            compared = f"{score.quantity}, difference from chance", self.differences, labels
-        for title, values, value_labels in ((score.quantity, self.pooled, labels), compared):
+            title = f"{score.quantity}, difference from chance"
+            compared = title, "", None, self.differences, labels
+        pooled = score.quantity, score.unit, score.limits, self.pooled, labels
+        for title, unit, limits, values, value_labels in (pooled, compared):
             for value, label in zip(values, value_labels, strict=True):
                 yield {
                     "participant": POOLED,
                     **label,
                     "quantity": title,
-                    **self._numbers(value),
+                    "unit": unit,
+                    **self._numbers(value, limits),
                     "interval": self.included_score.pooled_interval,
                     "simulated": self.simulated,
                 }
 
-    def _numbers(self, values: Sequence[float]) -> dict[str, float | None]:
-        """Return estimate and ends; what is unknown is ``None``."""
+    def _numbers(
+        self, values: Sequence[float], limits: tuple[float, float] | None
+    ) -> dict[str, Any]:
+        """Return estimate and ends; what is unknown is ``None``, with what limits say of it."""
         scaled = self.score.to_scale(np.array(values)).tolist()
         pairs = zip(_END, scaled, values, strict=True)
-        return {name: number if math.isfinite(raw) else None for name, number, raw in pairs}
+        numbers = {name: number if math.isfinite(raw) else None for name, number, raw in pairs}
+        return {**numbers, "outside levels": self._outside_text(values[0], limits)}
+
+    def _outside_text(self, estimate: float, limits: tuple[float, float] | None) -> str:
+        """Return where an estimate lies that the levels do not bound; empty for others."""
+        if limits is None or math.isfinite(estimate):
+            return ""
+        if math.isnan(estimate):  # outside for some participants
+            return "not bounded"
+        low, high = self.score.to_scale(np.array(limits)).tolist()
+        if estimate > 0.0:
+            return f"above {format_quantity(high, self.score.unit)}"
+        return f"below {format_quantity(low, self.score.unit)}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data with a schema number."""

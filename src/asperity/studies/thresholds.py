@@ -101,6 +101,8 @@ def score_thresholds(design: StudyDesign, answered: Answers) -> Score:
         *cells,
         is_logarithmic=True,
         interval="posterior of the psychometric function",
+        limits=levels.ends,
+        unit=design.unit,
     )
 
 
@@ -281,7 +283,8 @@ class LogLevels:
     def estimate_threshold(self, x: FloatArray, right: NDArray[np.bool_]) -> Interval:
         """Return the median of the posterior of α, and its central 95 % interval.
 
-        An end that lies outside the levels is infinite: the answers do not bound it.
+        What lies outside the levels is infinite, since it follows from the prior: the median, an
+        end on its own side. An end on the other side is the end of the levels.
 
         References:
             H. H. Schütt et al.: Painfree and accurate Bayesian estimation of psychometric functions
@@ -299,8 +302,8 @@ class LogLevels:
         below = np.cumsum(share) - 0.5 * share
         middle, low, high = np.interp(_QUANTILES, below, thresholds).tolist()
         lowest, highest = self.ends
-        if low <= lowest:
-            low = -math.inf
-        if high >= highest:
-            high = math.inf
+        if not lowest < middle < highest:
+            middle = math.copysign(math.inf, middle - lowest)
+        low = min(low, highest) if low > lowest else -math.inf
+        high = max(high, lowest) if high < highest else math.inf
         return middle, low, high
