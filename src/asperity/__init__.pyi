@@ -47,7 +47,7 @@ from asperity.scene.device_run import run as run
 from asperity.scene.loops import onset as onset
 from asperity.scene.loops import scan as scan
 from asperity.scene.loops import simulate as simulate
-from asperity.studies.study_report import plan_study as plan_study
+from asperity.studies.live.trial_session import plan_study as plan_study
 from asperity.studies.study_report import study_report as study_report
 from asperity.surface import Surface as Surface
 from asperity.sweeps.run_sweep import sweep as sweep

@@ -19,6 +19,7 @@ from tests.studies.study_texts import COMPARISON
 import asperity as asp
 from asperity.studies.live.player import Stimuli
 from asperity.studies.methods import METHODS
+from asperity.studies.simulated_participants import surface_strength
 from asperity.studies.study_file import load_study
 from asperity.studies.study_store import ANSWERS_FILE, DERIVED_FILES, list_participants, read_trials
 
@@ -80,6 +81,25 @@ def test_a_plan_states_the_power(call: Call, file: str) -> None:
     assert (code, err) == (0, "")
     assert "With 12 participants" in out
     assert out.strip() == asp.plan_study(file, 3.0, participants=12, simulations=10).text
+
+
+def test_a_plan_has_the_strength_of_the_scene(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert call("init", "detection", "mine.toml")[0] == 0
+    text = Path("mine.toml").read_text("utf-8").replace("trials = 40", "trials = 5")
+    reached = []
+    for stiffness in ("25 N/m", "100 N/m"):
+        Path("mine.toml").write_text(text.replace("100 N/m", stiffness), "utf-8")
+        plan = asp.plan_study("mine.toml", 3.0, participants=3, simulations=1)
+        assert f"The levels reach {plan.reach:.2g} times what is just felt." in plan.text
+        reached.append(plan.reach)
+    assert reached[1] == pytest.approx(4.0 * reached[0], rel=0.05)
+    stimuli = Stimuli(load_study("mine.toml"))
+    highest = {"surface.law": "D", "texture.amplitude": 1e-4}
+    felt = surface_strength(*stimuli.surface_and_device(highest))
+    assert reached[1] == pytest.approx(felt)
 
 
 @pytest.mark.parametrize(

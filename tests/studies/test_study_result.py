@@ -148,6 +148,17 @@ def test_plans_find_effects_and_nothing_else() -> None:
     assert "With 1 participant of 1 trial each" in replace(strong, participants=1, trials=1).text
 
 
+def test_plans_do_not_find_effects_below_what_is_felt() -> None:
+    design = design_of("detection", trials=30)
+    felt = plan(design, 4.0, 4, simulations=5)
+    weak = plan(design, 4.0, 4, simulations=5, level_strength=lambda one: one[AMPLITUDE] / 2e-3)
+    assert felt.found >= 4
+    assert weak.found == 0
+    assert felt.reach == pytest.approx(10.0)
+    assert "reach 0.05 times what is just felt" in weak.text
+    assert "reach" not in plan(design_of("axb"), 4.0, 4, simulations=1).text
+
+
 def test_observers_who_guess_show_no_effect() -> None:
     found = plan(design_of("axb"), 3.0, 10, simulations=40, observer="guessing")
     assert found.found <= 7

@@ -266,7 +266,7 @@ def plan_command(file: str, effect: float, **values: Any) -> None:
 
     The effect is the factor by which the first condition is stronger at the hand than the others.
     """
-    from asperity.studies.study_report import plan_study
+    from asperity.studies.live.trial_session import plan_study
 
     if effect == 1.0:
         raise ParameterError("effect", "must differ from 1", effect)

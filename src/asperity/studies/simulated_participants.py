@@ -200,6 +200,8 @@ class StudyPlan(Serializable):
         simulations: number of simulated studies.
         found: in how many the 95 % interval of the difference of the second from the first
             condition (or of the first pair from chance) leaves out no difference.
+        reach: strength of the highest level in the other conditions, over what is just felt;
+            ``None`` without levels.
     """
 
     participants: int
@@ -207,6 +209,7 @@ class StudyPlan(Serializable):
     effect: float
     simulations: int
     found: int
+    reach: float | None = None
 
     @property
     def power(self) -> Interval:
@@ -219,10 +222,13 @@ class StudyPlan(Serializable):
         power, low, high = [f"{100.0 * share:.0f} %" for share in self.power]
         people = count_text(self.participants, "participant")
         trials = count_text(self.trials, "trial")
+        levels = (
+            f" The levels reach {self.reach:.2g} times what is just felt." if self.reach else ""
+        )
         return (
             f"With {people} of {trials} each, "
             f"{power} ({low} to {high}) of {self.simulations} simulated studies find "
-            f"that the first condition is {self.effect:g} times as strong."
+            f"that the first condition is {self.effect:g} times as strong.{levels}"
         )
 
 
@@ -234,6 +240,7 @@ def plan(
     simulations: int = 200,
     observer: str = "typical",
     progress: Callable[[float], None] = lambda _share: None,
+    level_strength: Strength | None = None,
 ) -> StudyPlan:
     """Return how often a study would find an effect: its power, by simulation.
 
@@ -249,6 +256,8 @@ def plan(
         observer: name of the observer, see
             :data:`~asperity.studies.simulated_participants.OBSERVERS`.
         progress: called with the fraction done.
+        level_strength: of the stimuli of a study with levels, such as :func:`hand_strength`; by
+            default it is the level over the middle of the range.
 
     Raises:
         ParameterError: for fewer than three participants or two conditions, or an effect or a
@@ -263,7 +272,7 @@ def plan(
     kind = METHODS[design.kind]
     base = find_observer(observer)
     design = kind.complete(design)
-    strength = _planned_strength(design, effect)
+    strength = _planned_strength(design, effect, level_strength)
     found = 0
     trials = 0
     for number in range(simulations):
@@ -278,17 +287,23 @@ def plan(
         found += not low <= 0.0 <= high
         trials = len(answered["0"])
         progress((number + 1) / simulations)
-    return StudyPlan(count, trials, effect, simulations, found)
+    reach = None
+    if key := design.options.get("level"):
+        reach = strength({**design.conditions[1], key: design.range[1]})
+    return StudyPlan(count, trials, effect, simulations, found, reach)
 
 
-def _planned_strength(design: StudyDesign, effect: float) -> Strength:
-    """Return strengths: 1 in the middle of the range, ``effect`` times in the first condition."""
-    first = design.conditions[0]
+def _planned_strength(
+    design: StudyDesign, effect: float, level_strength: Strength | None
+) -> Strength:
+    """Return strengths: those of the second condition, ``effect`` times that in the first one."""
+    first, second = design.conditions[:2]
     key = str(design.options.get("level", ""))
     middle = math.sqrt(math.prod(design.range)) if key else 1.0
+    at_level = level_strength or (lambda values: float(values[key]) / middle)
 
     def strength(values: Values) -> float:
-        level = float(values[key]) / middle if key else 1.0
+        level = at_level({**second, key: values[key]}) if key else 1.0
         return level * (effect if first.items() <= values.items() else 1.0)
 
     return strength

@@ -25,8 +25,6 @@ from asperity.report.pages.sweep_report import find_loop_page
 from asperity.report.sentences.texts import NOT_AVAILABLE
 from asperity.studies.design import describe_source
 from asperity.studies.methods import METHODS
-from asperity.studies.simulated_participants import StudyPlan, plan
-from asperity.studies.study_file import load_study
 from asperity.studies.study_result import POOLED, StudyResult, analyse, exclusion_rules, label_text
 from asperity.studies.study_store import find_derived_files, read_study, read_trials, write_key
 
@@ -189,20 +187,6 @@ def study_report(folder: str | Path) -> StudyResult:
     """
     study = read_study(folder)
     return analyse(study.design, read_trials(folder), study.content)
-
-
-def plan_study(path: str | Path, effect: float, **options: Any) -> StudyPlan:
-    """Return how often a study would find an effect.
-
-    Args:
-        path: study file.
-        effect: factor of the strength at the hand in the first condition.
-        **options: as for :func:`asperity.studies.simulated_participants.plan`.
-
-    Raises:
-        ParameterError: for a study or an option that cannot be used.
-    """
-    return plan(load_study(path).design, effect, **options)
 
 
 def write_report(folder: str | Path, result: StudyResult) -> list[str]:

@@ -101,6 +101,11 @@ class Stimuli:
             self._checked[key] = setup
         return self._checked[key]
 
+    def surface_and_device(self, values: Mapping[str, Any]) -> tuple[Surface, Device]:
+        """Return what a stimulus that is within its limit is rendered on, see :meth:`setup`."""
+        setup = self.setup(values)
+        return setup.surface, setup.device
+
     def _make_setup(self, values: Mapping[str, Any]) -> Setup:
         """Return the loop of a stimulus, whose stiffness gives the texture force of the study."""
         setup = self._build_setup(values)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,15 @@ from asperity.scene.device_run import POLL_INTERVAL
 from asperity.studies.design import SIMULATED_DEVICE, Presentation, describe_source
 from asperity.studies.live.player import LoopPlayer, Stimuli
 from asperity.studies.live.screens import BACK, DOWN, GO_ON, PAUSE, STOP, UP, Screen, View
-from asperity.studies.simulated_participants import Observer, hand_strength, simulate_run
+from asperity.studies.methods import METHODS
+from asperity.studies.simulated_participants import (
+    Observer,
+    StudyPlan,
+    hand_strength,
+    plan,
+    simulate_run,
+)
+from asperity.studies.study_file import load_study
 from asperity.studies.study_store import Participant
 
 ADJUSTMENT_STEPS = 40  # of equal ratios, from the least to the greatest value
@@ -202,8 +211,26 @@ def simulate_session(participant: Participant, stimuli: Stimuli, observer: Obser
             f"{participant.code} belongs to {source}: simulated answers need another folder",
         )
     design = participant.study.design
-    setup = stimuli.setup
-    strength = hand_strength(design, lambda one: (setup(one).surface, setup(one).device))
+    strength = hand_strength(design, stimuli.surface_and_device)
     answered = simulate_run(design, participant.number, observer, strength, design.seed)
     for trial in answered[participant.trial - 1 :]:
         participant.record(trial.answer, 1.0, _current_time())  # after a second
+
+
+def plan_study(path: str | Path, effect: float, **options: Any) -> StudyPlan:
+    """Return how often a study would find an effect.
+
+    Levels are as strong as the scene renders them in the second condition.
+
+    Args:
+        path: study file.
+        effect: factor of the strength at the hand in the first condition.
+        **options: as for :func:`asperity.studies.simulated_participants.plan`.
+
+    Raises:
+        ParameterError: for a study or an option that cannot be used.
+    """
+    study = load_study(path)
+    design = METHODS[study.design.kind].complete(study.design)
+    strength = hand_strength(design, Stimuli(study).surface_and_device)
+    return plan(design, effect, level_strength=strength, **options)
