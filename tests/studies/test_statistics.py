@@ -220,6 +220,8 @@ def test_intervals_of_few_or_equal_values_are_unbounded() -> None:
     assert mean_interval(np.array([1.0, 2.0]), 100, 0) == (1.5, -math.inf, math.inf)
     assert mean_interval(np.full(12, 3.0), 100, 0) == (3.0, -math.inf, math.inf)
     assert math.isnan(mean_interval(np.array([]), 100, 0)[0])
+    outside = mean_interval(np.array([1.0, 2.0, math.inf]), 100, 0)
+    assert outside == (math.inf, -math.inf, math.inf)
 
 
 def test_thresholds_of_laws_come_out() -> None:

@@ -31,7 +31,8 @@ def mean_interval(values: FloatArray, resamples: int = 0, seed: int = 0) -> Inte
         seed: of the samples.
 
     Returns:
-        Mean and ends; the ends are infinite for fewer than 3 values or values that do not differ.
+        Mean and ends; the ends are infinite for fewer than 3 values, values that do not differ, or
+        an infinite one.
 
     References:
         B. Efron, R. J. Tibshirani: An Introduction to the Bootstrap (1993), section 12.5.
@@ -43,7 +44,9 @@ def mean_interval(values: FloatArray, resamples: int = 0, seed: int = 0) -> Inte
     """
     count = len(values)
     mean = float(np.mean(values)) if len(values) else math.nan
-    error = float(np.std(values, ddof=1)) / math.sqrt(count) if count > 2 else 0.0
+    if count < 3 or math.isinf(mean):
+        return mean, -math.inf, math.inf
+    error = float(np.std(values, ddof=1)) / math.sqrt(count)
     if not error > 0.0:
         return mean, -math.inf, math.inf
     low, high = _quantiles(values, mean, resamples, seed)
