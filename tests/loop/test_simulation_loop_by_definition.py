@@ -112,7 +112,7 @@ def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_lane_statistics_are_bounds_and_sums() -> None:
-    """Bounds since the start; sums of velocity and position since the last segment."""
+    """Bounds since the start; sums of velocity, position, energies since the last segment."""
     rows, ledgers = RNG.normal(size=(12, 6)), RNG.normal(size=(12, LEDGER_SIZE))
     statistics = np.zeros(STATISTICS_SIZE)
     statistics[LOW:SAMPLE_COUNT] = [np.inf] * 3 + [-np.inf] * 3
@@ -121,8 +121,8 @@ def test_lane_statistics_are_bounds_and_sums() -> None:
     statistics[SAMPLE_COUNT] = 0.0
     for x, ledger in zip(rows[5:], ledgers[5:], strict=True):
         lane_loop.update_statistics(statistics, x, ledger)
-    low, high, (count,), base, total, squares, last, *positions = np.split(
-        statistics, [3, 6, 7, 10, 13, 16, 18, 21, 24]
+    low, high, (count,), base, total, squares, first, *positions, energies, net = np.split(
+        statistics, [3, 6, 7, 10, 13, 16, 18, 21, 24, 27, 29]
     )
     np.testing.assert_array_equal(low, rows[:, :3].min(axis=0))
     np.testing.assert_array_equal(high, rows[:, :3].max(axis=0))
@@ -131,8 +131,12 @@ def test_lane_statistics_are_bounds_and_sums() -> None:
     np.testing.assert_array_equal(base, rows[5, 3:])
     np.testing.assert_allclose(total, deviations.sum(axis=0), rtol=1e-14)
     np.testing.assert_allclose(squares, (deviations**2).sum(axis=0), rtol=1e-14)
-    expected = [ledgers[-1, :3].sum(), ledgers[-1, LOST] - ledgers[-1, FRICTION]]
-    np.testing.assert_allclose(last, expected, rtol=1e-14)
+    supplied = ledgers[5:, :3].sum(axis=1)
+    taken = ledgers[5:, LOST] - ledgers[5:, FRICTION]
+    np.testing.assert_allclose(first, [supplied[0], taken[0]], rtol=1e-14)
+    changes = np.array([supplied - supplied[0], taken - taken[0]])
+    np.testing.assert_allclose(energies, changes.sum(axis=1), rtol=1e-13)
+    np.testing.assert_allclose(net, [np.square(changes[0] - changes[1]).sum()], rtol=1e-13)
     offsets = rows[5:, :3] - rows[5, :3]
     np.testing.assert_array_equal(positions[0], rows[5, :3])
     np.testing.assert_allclose(positions[1], offsets.sum(axis=0), rtol=1e-14)

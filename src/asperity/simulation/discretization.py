@@ -142,6 +142,9 @@ def exponential(matrix: FloatArray) -> FloatArray:
     return result
 
 
+_MAX_SIZE = 1e6
+
+
 def integrate(
     dynamics: FloatArray, loss_rate: FloatArray, span: float
 ) -> tuple[FloatArray, FloatArray]:
@@ -154,6 +157,9 @@ def integrate(
 
     Returns:
         e^{AT} - 1 and the symmetric matrix of ∫ zᵀ Q z dt as a form of z(0), (..., n, n).
+
+    Raises:
+        ArithmeticError: for a body that is too fast: each doubling doubles the rounding.
     """
     n = dynamics.shape[-1]
     zero = np.zeros_like(dynamics)
@@ -163,6 +169,8 @@ def integrate(
     # Van Loan: the exponential of [[-Aᵀ, Q], [0, A]] holds e^{-Aᵀτ} ∫ e^{Aᵀt} Q e^{At} dt. Over a
     # short τ, for e^{-Aᵀτ} of an overdamped body grows beyond all digits; then τ is doubled.
     size = span * float(np.abs(dynamics).sum(axis=-1).max())
+    if not size < _MAX_SIZE:
+        raise ArithmeticError("the body is too fast")
     doublings = math.ceil(math.log2(size)) if size > 1.0 else 0
     back = -np.swapaxes(dynamics, -1, -2)
     short = span / 2.0**doublings

@@ -213,7 +213,7 @@ def _virtual_damping_rule(loop: DeviceLoop) -> StiffnessRule:
 def _wall_rule(loop: DeviceLoop) -> StiffnessRule:
     """The paper's rule has no delay: it is that of a loop with the delay d₀ of the wall test."""
     formula = "k q <= K₀"
-    if loop.delay not in (None, loop.wall_delay):
+    if loop.delayed_wall_stiffness != loop.wall_stiffness:
         formula += " (1/2 + d₀)/(1/2 + d)"
     return StiffnessRule(
         WALL,
