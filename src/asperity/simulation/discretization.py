@@ -142,7 +142,7 @@ def exponential(matrix: FloatArray) -> FloatArray:
     return result
 
 
-_MAX_SIZE = 1e6
+_MAX_SIZE = 1e20  # of A T
 
 
 def integrate(
@@ -159,7 +159,7 @@ def integrate(
         e^{AT} - 1 and the symmetric matrix of ∫ zᵀ Q z dt as a form of z(0), (..., n, n).
 
     Raises:
-        ArithmeticError: for a body that is too fast: each doubling doubles the rounding.
+        ArithmeticError: for a body that is too fast for so many doublings.
     """
     n = dynamics.shape[-1]
     zero = np.zeros_like(dynamics)
