@@ -24,7 +24,7 @@ import argparse
 import itertools
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -35,12 +35,11 @@ from asperity.analysis import characteristic_number
 from asperity.analysis.passivity.recommended_stiffness import load_margins
 from asperity.laws import LAWS as LAWS_BY_LETTER
 from asperity.loop import lane_loop
-from asperity.loop.simulated_device import FRICTION, LOST, SUPPLIED
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from asperity.simulation.lanes import BatchSimulation, StopRule, Trajectory
-from asperity.simulation.onset_search import felt_speed
-from asperity.simulation.trace import SegmentStatistics, ends_of_quarters
+from asperity.simulation.onset_search import limit_cycle_rule
+from asperity.simulation.trace import SegmentStatistics
 from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
 from asperity.textures.texture import Texture
@@ -53,10 +52,7 @@ CEILINGS = {"A": 0.09, "E": 0.39}
 """Onset over K₀/q of the paper's pantograph held loosely, which is not among the random loops."""
 SEARCH_LOOPS, LOOPS = 500, 2000
 SEED = 20261124
-DURATION = 1.0  # [s] of the first run; one that still moves is extended to 16 times as long
-DURATION_FACTORS = (1.0, 4.0, 16.0)
-DECAY_RATIO = 0.9
-LASTING_SHARE = 0.9  # of the loss that the texture supplies in a motion that lasts
+DURATION = 1.0  # [s] of the first run; one that still moves is extended to 64 times as long
 DELAYS = (0, 0, 1, 2, 6)
 MAX_GAIN = 50.0  # a law whose q is greater has no start to speak of
 CURVE_FACTORS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
@@ -263,14 +259,8 @@ def lasting_motion(
         loop.velocity,
     )
     seen: list[SegmentStatistics] = []
-
-    def energies() -> tuple[float, float]:
-        sums = run.ledger_sums.tolist()
-        supplied = sums[SUPPLIED] + sums[SUPPLIED + 1] + sums[SUPPLIED + 2]
-        return supplied, sums[LOST] - sums[FRICTION]
-
-    rule = _lasting_rule(loop.period, energies, seen)
-    run = batch.new_trajectory(stiffness, loop.delay, np.zeros(3), rule)
+    rule = limit_cycle_rule(lambda times: round(times * DURATION / loop.period), loop.period)
+    run = batch.new_trajectory(stiffness, loop.delay, np.zeros(3), _record(rule, seen))
     while run.verdict is None:
         batch.run([run])
     if not run.verdict:
@@ -289,30 +279,15 @@ def _speed_norm(run: Trajectory, seen: list[SegmentStatistics]) -> float:
     return math.sqrt(float(np.sum(squares / count - (sums / count) ** 2)))
 
 
-def _lasting_rule(
-    period: float, energies: Callable[[], tuple[float, float]], seen: list[SegmentStatistics]
-) -> StopRule:
-    """Return the rule by which the table was counted; keep the statistics that it is given.
-
-    A run is extended while its motion is felt and decays by more than a tenth per quarter of the
-    longest one; it lasts if in its last quarter the texture supplies nine tenths of the loss.
-    ``asperity onset`` extends runs further, and averages over whole oscillations.
-    """
-    for factor in DURATION_FACTORS:
-        supplies = []
-        for goal in ends_of_quarters(round(factor * DURATION / period)):
-            seen.append((yield goal))
-            supplies.append(energies())
-            if seen[-1].stop:
-                return True
-        before, last = seen[-2:]
-        if last.velocity_spread <= felt_speed(last.velocity_spread, last.position_spread):
-            return False
-        ratio = DECAY_RATIO ** (factor / DURATION_FACTORS[-1])
-        if factor > 1.0 and not last.velocity_spread < ratio * before.velocity_spread:
-            supplied, taken = (supplies[-1][i] - supplies[-2][i] for i in range(2))
-            return supplied > LASTING_SHARE * taken
-    return False
+def _record(rule: StopRule, seen: list[SegmentStatistics]) -> StopRule:
+    """Evaluate a rule, and keep the statistics that it was given."""
+    goal = next(rule)
+    while True:
+        seen.append((yield goal))
+        try:
+            goal = rule.send(seen[-1])
+        except StopIteration as end:
+            return bool(end.value)
 
 
 def count_cycles(

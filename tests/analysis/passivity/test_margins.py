@@ -40,8 +40,12 @@ PLAUSIBLE = StabilityLimit(1000.0, "plausible", "wall test")
 @pytest.mark.parametrize(
     ("letter", "along_lightest", "cycling"),
     [
-        ("C", False, (133, 535, 555, 723, 936, 959, 1022, 1166, 1212, 1377, 1456, 1841, 1948)),
-        ("G", True, (693, 749, 751, 806, 1057, 1217, 1342, 1458, 1715, 1954)),
+        (
+            "C",
+            False,
+            (133, 457, 535, 555, 723, 936, 959, 1022, 1166, 1212, 1377, 1456, 1758, 1841, 1948),
+        ),
+        ("G", True, (693, 749, 751, 806, 1057, 1217, 1342, 1458, 1613, 1715, 1726, 1787, 1954)),
     ],
 )
 def test_random_loops_reproduce_the_margin(
@@ -51,17 +55,12 @@ def test_random_loops_reproduce_the_margin(
     margin = load_margins(along_lightest)[find_law(letter)]
     found = count_cycles(letter, margin.factor, 200, SEED + 1, along_lightest)
     assert [one.loop for one in found.motions] == [one for one in cycling if one < 200]
-    loops = [random_loop(SEED + 1, number) for number in cycling]
-    starts = [
-        loop.wall
-        * (loop.weakest_axis if along_lightest else 1.0)
-        / characteristic_number(loop.surface(letter), 0.05).value
-        for loop in loops
-    ]
-    motions = [
-        lasting_motion(loop, letter, margin.factor * start)
-        for loop, start in zip(loops, starts, strict=True)
-    ]
+    motions = []
+    for loop in (random_loop(SEED + 1, number) for number in cycling):
+        wall = loop.wall * (loop.weakest_axis if along_lightest else 1.0)
+        q = characteristic_number(loop.surface(letter), 0.05).value
+        # In this order: a start that differs by its rounding may end elsewhere.
+        motions.append(lasting_motion(loop, letter, margin.factor * wall / q))
     speeds = [motion.speed for motion in motions if motion is not None]
     assert len(speeds) == margin.cycles
     assert max(speeds) == pytest.approx(margin.speed, rel=1e-2)
@@ -181,17 +180,17 @@ def test_margin_at_a_risk_is_the_greatest_factor_up_to_which_the_curve_allows_it
             if five.factor > margin.factor:
                 assert (five.loops, five.cycles) == (margin.curve_loops, five.cycles)
     shading = load_margins()[find_law("G")]
-    assert (shading.factor, shading.at_risk(0.05).factor, shading.limit_share) == (0.07, 0.3, 0.102)
+    assert (shading.factor, shading.at_risk(0.05).factor, shading.limit_share) == (0.05, 0.3, 0.115)
     assert shading.at_risk(1.0).factor == 1.0
 
 
-@pytest.mark.parametrize("letter", ["G", "H"])
-def test_a_sample_of_the_curve_is_reproduced(letter: str) -> None:
-    """The first 60 of the loops of the curve: no more cycle than of all of them."""
-    margin = load_margins()[find_law(letter)]
-    five = margin.at_risk(0.05)
+@pytest.mark.parametrize(("letter", "cycling"), [("G", [4, 21, 24, 43, 44]), ("H", [51])])
+def test_a_sample_of_the_curve_is_reproduced(letter: str, cycling: list[int]) -> None:
+    """The first 60 of the loops of the curve, and at the limit no fewer of them cycle."""
+    five = load_margins()[find_law(letter)].at_risk(0.05)
     found = count_cycles(letter, five.factor, 60, SEED + 1)
-    assert found.share <= 0.05
+    assert [one.loop for one in found.motions] == cycling
+    assert len(cycling) <= five.cycles <= 0.05 * five.loops
     assert count_cycles(letter, 1.0, 60, SEED + 1).cycles >= found.cycles
 
 
