@@ -30,7 +30,7 @@ def test_curvature_bounds_are_the_maximum_over_all_batches(
     seen: list[int] = []
 
     def hull_batch(first: int, last: int, *rest: Any) -> None:
-        out = rest[4]
+        *_, out, _marks, _field = rest
         seen.extend(range(first, last))
         for side in range(2):
             size = (3.0 if side == stiffer else 1.0) + (1.0 if first == 16 else 0.0)

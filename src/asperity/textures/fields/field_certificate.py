@@ -25,6 +25,7 @@ from asperity.textures.fields.field_record import (
 )
 from asperity.textures.texture import CertifiedNumber
 
+IntArray = NDArray[np.int64]
 Progress = Callable[[float], None]
 CurvatureBounds = tuple[FloatArray, FloatArray]
 
@@ -160,11 +161,12 @@ def _upward_weights(field: FieldArguments) -> FloatArray:
     return np.ascontiguousarray(upward)
 
 
-def product_weights(field: FieldArguments) -> tuple[NDArray[np.int64], FloatArray]:
-    """Return for pairs of Bernstein coefficients of degree 2 that of degree 4, and its weight.
+def product_weights(field: FieldArguments) -> tuple[IntArray, IntArray, FloatArray]:
+    """Return the pairs of Bernstein coefficients of degree 2 that add to those of degree 4.
 
-    Of a cell, (27, 27) each, or (9, 9) for a profile: the weight of i and j along an axis is
-    C(2, i) C(2, j)/C(4, i + j).
+    Returns:
+        The first pair of each coefficient, and their end; the pairs; and the weight of each, which
+        along an axis is C(2, i) C(2, j)/C(4, i + j).
     """
     place = np.add.outer(np.arange(3), np.arange(3))
     weight = np.outer([1, 2, 1], [1, 2, 1]) / np.array([1, 4, 6, 4, 1])[place]
@@ -174,4 +176,7 @@ def product_weights(field: FieldArguments) -> tuple[NDArray[np.int64], FloatArra
         size = 3 * len(places)
         places = (5 * places[:, None, :, None] + place[:, None]).reshape(size, size)
         weights = np.kron(weights, weight)
-    return np.ascontiguousarray(places), np.ascontiguousarray(weights)
+    order = np.argsort(places, axis=None, kind="stable")
+    starts = np.searchsorted(places.ravel()[order], np.arange(places.max() + 2))
+    pairs = np.column_stack(np.unravel_index(order, places.shape))
+    return starts, pairs, weights.ravel()[order]

@@ -41,6 +41,7 @@ KERNELS = Kernels(loops=("hull_batch",), iterates=True)
 SLACK = 1e-7
 # Rounding error of a minor, for second derivatives of about 1.
 MINOR_ROUNDING = 1e-14
+LANES = 32
 
 
 def largest_eigenvalue_3x3(
@@ -127,8 +128,8 @@ def expand_run(
 def measure_hulls(count: int, hull: FloatArray, work: FloatArray, size: int) -> None:
     """Write how far the coefficients of each cell are from its middle one, and the greatest S.
 
-    Rows 0, 1, 2 and 4 of ``work`` are those of S, of Hess S, squared, the greatest S, and that of
-    ∂S/∂z; row 3 is made large.
+    Rows 0, 2 and 4 of ``work`` are that of S, the greatest S, and that of ∂S/∂z; row 1 is the
+    product of that of S and that of Hess S; row 3 is made large.
     """
     middle = size // 2
     for k in range(count):
@@ -148,6 +149,8 @@ def measure_hulls(count: int, hull: FloatArray, work: FloatArray, size: int) -> 
             work[4, k] = max(work[4, k], abs(hull[q, 3, k] - hull[middle, 3, k]))
             work[1, k] = max(work[1, k], change)
             work[2, k] = max(work[2, k], s)
+    for k in range(count):
+        work[1, k] = work[0, k] * math.sqrt(work[1, k])
 
 
 def exclude_cells(
@@ -168,7 +171,7 @@ def exclude_cells(
     side = 0.5 * field.fade / field.below
     for q in range(size):
         for k in range(count):
-            slack = work[0, k] * math.sqrt(work[1, k])
+            slack = work[1, k]
             above = bounds[0, 0] * (1.0 - SLACK) - slack
             s0 = hull[middle, 0, k]
             ds = hull[q, 0, k] - s0
@@ -218,26 +221,46 @@ def exclude_outside(count: int, work: FloatArray) -> None:
             work[3, k] = 1.0
 
 
-def multiply_hull(
-    k: int, hull: FloatArray, pairs: IntArray, weights: FloatArray, product: FloatArray
+def pack_cell(k: int, lane: int, size: int, hull: FloatArray, packed: FloatArray) -> None:
+    """Copy the coefficients of cell k of a run to a lane of packed cells, (27, 10, LANES)."""
+    for q in range(size):
+        for t in range(10):
+            packed[q, t, lane] = hull[q, t, k]
+
+
+def multiply_packed(
+    n: int,
+    starts: IntArray,
+    pairs: IntArray,
+    weights: FloatArray,
+    packed: FloatArray,
+    product: FloatArray,
 ) -> None:
-    """Write the Bernstein coefficients of degree 4 of Hess T and S ∂S/∂z on cell k, (125, 7)."""
+    """Write Bernstein coefficient n, of degree 4, of Hess T and S ∂S/∂z of packed cells.
+
+    Its pairs of coefficients of degree 2 are those from ``starts[n]`` to ``starts[n + 1]``. They
+    are rows 0 to 6 of ``product``, (8, LANES); the last one is left to :func:`least_minors`.
+    """
     product[:] = 0.0
-    for i in range(pairs.shape[0]):
-        s = hull[i, 0, k]
-        x = hull[i, 1, k]
-        y = hull[i, 2, k]
-        z = hull[i, 3, k]
-        for j in range(pairs.shape[0]):
-            n = pairs[i, j]
-            w = weights[i, j]
-            product[n, 0] += w * (s * hull[j, 4, k] + x * hull[j, 1, k])
-            product[n, 1] += w * (s * hull[j, 5, k] + x * hull[j, 2, k])
-            product[n, 2] += w * (s * hull[j, 6, k] + x * hull[j, 3, k])
-            product[n, 3] += w * (s * hull[j, 7, k] + y * hull[j, 2, k])
-            product[n, 4] += w * (s * hull[j, 8, k] + y * hull[j, 3, k])
-            product[n, 5] += w * (s * hull[j, 9, k] + z * hull[j, 3, k])
-            product[n, 6] += w * s * hull[j, 3, k]
+    for term in range(starts[n], starts[n + 1]):
+        i = pairs[term, 0]
+        j = pairs[term, 1]
+        w = weights[term]
+        for k in range(LANES):
+            s = w * packed[i, 0, k]
+            x = w * packed[i, 1, k]
+            y = w * packed[i, 2, k]
+            z = w * packed[i, 3, k]
+            along_x = packed[j, 1, k]
+            along_y = packed[j, 2, k]
+            along_z = packed[j, 3, k]
+            product[0, k] += s * packed[j, 4, k] + x * along_x
+            product[1, k] += s * packed[j, 5, k] + x * along_y
+            product[2, k] += s * packed[j, 6, k] + x * along_z
+            product[3, k] += s * packed[j, 7, k] + y * along_y
+            product[4, k] += s * packed[j, 8, k] + y * along_z
+            product[5, k] += s * packed[j, 9, k] + z * along_z
+            product[6, k] += s * along_z
 
 
 def has_corner_above(k: int, size: int, hull: FloatArray, bounds: FloatArray) -> bool:
@@ -262,44 +285,104 @@ def has_corner_above(k: int, size: int, hull: FloatArray, bounds: FloatArray) ->
     return False
 
 
-def raise_bound(
-    row: int,
-    place: tuple[int, int, int],
+def is_undecided(
     k: int,
+    place: tuple[int, int, int],
     rate: float,
+    size: int,
     hull: FloatArray,
+    work: FloatArray,
+    bounds: FloatArray,
+    marks: NDArray[np.uint8],
+) -> bool:
+    """Return whether the product must be formed on cell k of a run; unmark it if it is excluded."""
+    i, j, m = place
+    tests = marks.shape[0] > 0
+    if tests and marks[i, j, m + k] == 0:
+        return False
+    if work[3, k] > MINOR_ROUNDING:
+        if tests:
+            marks[i, j, m + k] = 0
+        return False
+    return not (tests and rate == 0.0 and has_corner_above(k, size, hull, bounds))
+
+
+def least_minors(
+    n: int, places: FloatArray, bounds: FloatArray, product: FloatArray, field: FieldArguments
+) -> None:
+    """Write the least minor of either bound of Hess T at coefficient n to the last row of products.
+
+    Below the floor the rate, 1/F, is not zero. The Hessian there is that of the spline, its second
+    derivative along z lowered by 1/F of what the force less the depth exceeds the lift by, all
+    times ψ' for each z, plus 1 - ψ'² times 1 less the same: no eigenvalue exceeds both bounds, and
+    none is attained. Row 5 is lowered by that, which becomes row 6.
+
+    Args:
+        n: coefficient of degree 4.
+        places: the node in the middle of each cell, along the axes, and its rate, (4, LANES).
+        bounds: as in :func:`hull_batch`.
+        product: from :func:`multiply_packed`.
+        field: the field.
+    """
+    side = 0.5 * field.fade / field.below
+    part = 0.25 * (n % 5) - 0.5
+    upper = bounds[0, 0] * (1.0 - SLACK)
+    lower = bounds[1, 0] * (1.0 - SLACK)
+    if n // 25 % 4 + n // 5 % 5 % 4 + n % 5 % 4 == 0:  # at a corner, where it is attained
+        upper = min(upper, bounds[0, 1])
+        lower = min(lower, bounds[1, 1])
+    for k in range(LANES):
+        depth = (field.below + 0.5 - places[2, k] - part) * side + field.lift
+        drop = -places[3, k] * (product[6, k] + depth)
+        xx = product[0, k]
+        xy = product[1, k]
+        xz = product[2, k]
+        yy = product[3, k]
+        yz = product[4, k]
+        zz = product[5, k] - drop
+        product[5, k] = zz
+        wall = 1.0
+        if places[3, k] > 0.0:
+            wall = bounds[0, 0] - 1.0 + drop
+        product[7, k] = min(
+            least_minor(upper, xx, xy, xz, yy, yz, zz),
+            least_minor(lower, -xx, -xy, -xz, -yy, -yz, -zz),
+            wall,
+        )
+        product[6, k] = drop
+
+
+def raise_bounds(
+    n: int,
+    lane: int,
+    places: FloatArray,
+    packed: FloatArray,
     product: FloatArray,
     bounds: FloatArray,
     field: FieldArguments,
 ) -> None:
-    """Raise the bounds of Hess T, or of its negative, by cell k of a run from a place on.
+    """Raise the bounds of Hess T and of its negative by coefficient n of a packed cell.
 
-    ``bounds[row]`` holds the upper bound, the greatest value attained, and where. Below the floor
-    the rate, 1/F, is not zero. The Hessian there is that of the spline, its second derivative along
-    z lowered by 1/F of what the force less the depth exceeds the lift by, all times ψ' for each z,
-    plus 1 - ψ'² times 1 less the same: no eigenvalue exceeds both bounds, and none is attained.
+    ``bounds[row]`` holds the upper bound, the greatest value attained, and where.
     """
-    sign = 1.0 - 2.0 * row
-    side = 0.5 * field.fade / field.below
     rows = min(field_rows(field), 3)
-    for n in range(125 if rows > 1 else 25):
-        e = n // 25
-        f = n // 5 % 5
-        g = n % 5
-        w = place[2] + k + 0.25 * g - 0.5
-        corner = rate == 0.0 and e % 4 + f % 4 + g % 4 == 0
-        corner = corner and hull[9 * (e // 2) + 3 * (f // 2) + g // 2, 0, k] > 0.0
-        drop = -rate * (product[n, 6] + (field.below + 0.5 - w) * side + field.lift)
-        if rate > 0.0 and row == 0:
-            bounds[0, 0] = max(bounds[0, 0], 1.0 - drop)
-        zz = sign * (product[n, 5] - drop)
+    e = n // 25
+    f = n // 5 % 5
+    g = n % 5
+    rate = places[3, lane]
+    corner = rate == 0.0 and e % 4 + f % 4 + g % 4 == 0
+    corner = corner and packed[9 * (e // 2) + 3 * (f // 2) + g // 2, 0, lane] > 0.0
+    if rate > 0.0:
+        bounds[0, 0] = max(bounds[0, 0], 1.0 - product[6, lane])
+    for row in range(2):
+        sign = 1.0 - 2.0 * row
         matrix = (
-            sign * product[n, 0],
-            sign * product[n, 1],
-            sign * product[n, 2],
-            sign * product[n, 3],
-            sign * product[n, 4],
-            zz,
+            sign * product[0, lane],
+            sign * product[1, lane],
+            sign * product[2, lane],
+            sign * product[3, lane],
+            sign * product[4, lane],
+            sign * product[5, lane],
         )
         bound = bounds[row, 0] * (1.0 - SLACK)
         if corner:
@@ -310,43 +393,42 @@ def raise_bound(
         bounds[row, 0] = max(bounds[row, 0], top * (1.0 + 2.0 * SLACK))
         if corner and top > bounds[row, 1]:
             bounds[row, 1] = top
-            bounds[row, 2] = place[0] + 0.25 * f - 0.5
-            bounds[row, 3] = place[1] + (0.25 * e - 0.5 if rows > 1 else 0.0)
-            bounds[row, 4] = w
+            bounds[row, 2] = places[0, lane] + 0.25 * f - 0.5
+            bounds[row, 3] = places[1, lane] + (0.25 * e - 0.5 if rows > 1 else 0.0)
+            bounds[row, 4] = places[2, lane] + 0.25 * g - 0.5
 
 
-def search_run(
-    place: tuple[int, int, int],
+def search_packed(
     count: int,
-    rate: float,
-    hull: FloatArray,
-    work: FloatArray,
+    places: FloatArray,
+    starts: IntArray,
     pairs: IntArray,
     weights: FloatArray,
+    packed: FloatArray,
     product: FloatArray,
     bounds: FloatArray,
     marks: NDArray[np.uint8],
     field: FieldArguments,
 ) -> None:
-    """Raise the bounds by the cells of a run that are not excluded, or test these cells."""
+    """Raise the bounds by the first packed cells, or unmark those by which they are not raised."""
     upper = bounds[0, 0]
     lower = bounds[1, 0]
     tests = marks.shape[0] > 0
-    for k in range(count):
-        if tests and marks[place[0], place[1], place[2] + k] == 0:
-            continue
-        is_open = not work[3, k] > MINOR_ROUNDING
-        is_above = tests and is_open and rate == 0.0
-        is_above = is_above and has_corner_above(k, pairs.shape[0], hull, bounds)
-        if is_open and not is_above:
-            multiply_hull(k, hull, pairs, weights, product)
-            for row in range(2):
-                raise_bound(row, place, k, rate, hull, product, bounds, field)
-        if tests:
-            is_above |= bounds[0, 0] > upper or bounds[1, 0] > lower
-            marks[place[0], place[1], place[2] + k] = 1 if is_above else 0
-            bounds[0, 0] = upper
-            bounds[1, 0] = lower
+    if tests:
+        for k in range(count):
+            marks[int(places[0, k]), int(places[1, k]), int(places[2, k])] = 0
+    for n in range(starts.shape[0] - 1):
+        multiply_packed(n, starts, pairs, weights, packed, product)
+        least_minors(n, places, bounds, product, field)
+        for k in range(count):
+            if product[7, k] > MINOR_ROUNDING:
+                continue
+            raise_bounds(n, k, places, packed, product, bounds, field)
+            if tests:
+                if bounds[0, 0] > upper or bounds[1, 0] > lower:
+                    marks[int(places[0, k]), int(places[1, k]), int(places[2, k])] = 1
+                bounds[0, 0] = upper
+                bounds[1, 0] = lower
 
 
 def hull_batch(
@@ -354,6 +436,7 @@ def hull_batch(
     last: int,
     plane: FloatArray,
     upward: FloatArray,
+    starts: IntArray,
     pairs: IntArray,
     weights: FloatArray,
     bounds: FloatArray,
@@ -367,8 +450,10 @@ def hull_batch(
         last: node after the last.
         plane: weights of the columns around a cell, (9, 6, 9); (3, 6, 3) for a profile.
         upward: weights along z, (3, 3, 3, levels).
-        pairs: coefficient of the product to which a pair of coefficients adds, (27, 27) or (9, 9).
-        weights: its weight, likewise.
+        starts: the first of the pairs of coefficients whose products add to each coefficient of
+            degree 4, and their end, (126,) or (26,).
+        pairs: of coefficients, (729, 2) or (81, 2).
+        weights: of their products.
         bounds: (2, 5), for Hess T and for its negative: an upper bound of the greatest eigenvalue,
             the greatest value attained at a corner, and that corner in nodes along the axes.
         marks: cells to test, not 0: left so if their bounds are above those given, which then do
@@ -376,12 +461,17 @@ def hull_batch(
         field: the field.
     """
     rows = min(field_rows(field), 3)
-    size = pairs.shape[0]
+    size = 9 * rows
     nodes = local_array((9, 34))
     mixed = local_array((6, 34))
     work = local_array((5, 32))
     hull = local_array((27, 10, 32))
-    product = local_array((125, 7))
+    packed = local_array((27, 10, LANES))
+    product = local_array((8, LANES))
+    places = local_array((4, LANES))
+    packed[:] = 0.0
+    lanes = 0
+    terms = (starts, pairs, weights)
     lines = max(field_rows(field) - 3 + int(field.border != PERIODIC), 1)
     tests = marks.shape[0] > 0
     for i in range(lines):
@@ -392,18 +482,29 @@ def hull_batch(
                 marks[j, i, :1] = 0
                 marks[j, i, end:] = 0
             while m < end:
+                if tests and marks[j, i, m] == 0:
+                    m += 1
+                    continue
                 above = m > field.below
                 count = min(32, (end if above else min(end, field.below + 1)) - m)
+                while tests and marks[j, i, m + count - 1] == 0:
+                    count -= 1
                 rate = 0.0 if above else 1.0 / field.fade
-                if tests and not marks[j, i, m : m + count].any():
-                    m += count
-                    continue
                 load_nodes(i, j, m - 1, count + 2, rows, nodes, field)
                 expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull)
                 measure_hulls(count, hull, work, size)
                 exclude_cells(m, count, rate, hull, bounds, work, size, field)
-                place = (j, i, m)
-                search_run(
-                    place, count, rate, hull, work, pairs, weights, product, bounds, marks, field
-                )
+                for k in range(count):
+                    if not is_undecided(k, (j, i, m), rate, size, hull, work, bounds, marks):
+                        continue
+                    pack_cell(k, lanes, size, hull, packed)
+                    places[0, lanes] = j
+                    places[1, lanes] = i
+                    places[2, lanes] = m + k
+                    places[3, lanes] = rate
+                    lanes += 1
+                    if lanes == LANES:
+                        search_packed(lanes, places, *terms, packed, product, bounds, marks, field)
+                        lanes = 0
                 m += count
+    search_packed(lanes, places, *terms, packed, product, bounds, marks, field)
