@@ -212,14 +212,14 @@ def format_quantity(value: float, unit: str, digits: int = 3) -> str:
     return f"{float(f'{value / 10.0**exponent:.{digits}g}'):.10g} {_PREFIXES[exponent]}{unit}"
 
 
-def count_text(count: int, noun: str) -> str:
+def count_text(count: float, noun: str) -> str:
     """Return a number of things.
 
     Example:
-        >>> count_text(1, "law"), count_text(3, "law")
-        ('1 law', '3 laws')
+        >>> count_text(1, "law"), count_text(3, "law"), count_text(0.5, "sample")
+        ('1 law', '3 laws', '0.5 samples')
     """
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    return f"{count:.10g} {noun}" if count == 1 else f"{count:.10g} {noun}s"
 
 
 def format_stiffness(stiffness: float) -> str:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from asperity.devices import override_device, parse_device
-from asperity.report.sentences.loop_text import rate_lines
+from asperity.report.sentences.loop_text import onset_answer, rate_lines
+from asperity.scene import load_scene
+from asperity.scene.setup import make_setup
 from asperity.servo.loop_memory import LoopStatistics
+from asperity.simulation.onset import Onset, Prediction
 
 
 @pytest.mark.parametrize(
@@ -32,3 +37,23 @@ def test_a_loop_below_the_rate_of_its_answer_is_named(
         assert lines == []
     else:
         assert f"only {share} of the stiffness" in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("resolution", "cycling", "reason"),
+    [
+        (0.0, 96.0, "what moves below it decays, but counts as a cycle"),
+        (20e-6, 96.0, "not for steps of 20 µm"),
+        (0.0, 101.0, None),
+    ],
+)
+def test_a_cycle_below_a_proved_rule_is_explained(
+    resolution: float, cycling: float, reason: str | None
+) -> None:
+    setup = make_setup(load_scene("examples/press.toml"))
+    servo = replace(setup.servo, position_resolution=resolution)
+    onset = Onset("C", 1, 0.9 * cycling, cycling, 1, 1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    prediction = Prediction(onset, 1e-3, 1.0, 1.0, 1.0, True, 50.0, 100.0, None)
+    answer = onset_answer(replace(setup, servo=servo), [prediction])
+    assert ("at this share of it: C at d = 1 (96 %)" in answer) == (reason is not None)
+    assert reason is None or reason in answer

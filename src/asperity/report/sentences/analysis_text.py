@@ -8,7 +8,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.limits.limit_rules import LIMIT_RULES
 from asperity.analysis.results import check_limits
 from asperity.analysis.results.analyze import Analysis
-from asperity.core.units import format_quantity
+from asperity.core.units import count_text, format_quantity
 from asperity.devices import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
 from asperity.envelopes.envelope import DeviceEnvelope, LawEnvelope
 from asperity.envelopes.wave_borders import WaveBorders
@@ -204,7 +204,7 @@ def wall_test_text(test: WallTest) -> str:
         source = f" ({test.rate_source})" if test.rate_source else ""
         parts.append(f"at {format_quantity(test.update_rate, 'Hz')}{source}")
     if test.delay_samples is not None:
-        parts.append(f"{test.delay_samples:g} samples of delay")
+        parts.append(f"{count_text(test.delay_samples, 'sample')} of delay")
     if test.positions:
         parts.append(f"{test.positions} positions")
     if test.lightest:

@@ -11,7 +11,7 @@ from asperity.analysis.passivity.recommended_stiffness import Margin, load_margi
 from asperity.analysis.results.compare import Comparison
 from asperity.analysis.results.recommendation import LawRow
 from asperity.core.errors import ArgumentWriter, write_keyword
-from asperity.core.units import format_quantity, format_stiffness, round_down, round_up
+from asperity.core.units import count_text, format_quantity, format_stiffness, round_down, round_up
 from asperity.core.version import __version__
 from asperity.devices import Device
 from asperity.report.sentences.limit_sentences import (
@@ -269,10 +269,10 @@ def _proved_text(row: LawRow, device: Device) -> str:
     delay = device.value("delay_samples") or 0.0
     proved_delay = row.passivity.greatest_delay
     if proved_delay is None or proved_delay < delay:
-        samples = f"{delay:.0f}"
+        samples = count_text(round(delay), "sample")
     else:
-        samples = f"up to {proved_delay}"
-    return f"It is proved passive up to {at_most}, at the start with {samples} samples of delay."
+        samples = f"up to {count_text(proved_delay, 'sample')}"
+    return f"It is proved passive up to {at_most}, at the start with {samples} of delay."
 
 
 def _bounded_text(row: LawRow, device: Device) -> str:

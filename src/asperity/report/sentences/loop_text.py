@@ -203,13 +203,20 @@ def replay_answer(replay: Replay) -> str:
     return f"{count}; {difference}. The largest difference of a force is {largest}.{end}"
 
 
+_STEPPED_RULE = "The rule is proved for exact positions, not for steps of {}."
+_SLOW_DECAY = (
+    "The rule is a proof for exact positions: what moves below it decays, but counts as a cycle "
+    "where the texture supplies at least nine tenths of what damping takes."
+)
+
+
 def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
     """Return the result in two sentences."""
     sentences = [_delay_rule_text(predictions)]
     step = setup.servo.position_resolution
-    if step and any(prediction.violates_delay_rule for prediction in predictions):
+    if any(prediction.violates_delay_rule for prediction in predictions):
         resolution = format_quantity(step, "m")
-        sentences.append(f"The rule is proved for exact positions, not for steps of {resolution}.")
+        sentences.append(_STEPPED_RULE.format(resolution) if step else _SLOW_DECAY)
     textured = [prediction for prediction in predictions if not prediction.onset.is_smooth_wall]
     if any(prediction.wall_rule is not None for prediction in textured):
         sentences.append(_wall_rule_text(predictions))

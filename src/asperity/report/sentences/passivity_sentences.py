@@ -33,7 +33,7 @@ from asperity.analysis.passivity.device_loop import (
 )
 from asperity.analysis.passivity.recommended_stiffness import StabilityLimit
 from asperity.analysis.passivity.verdict import Ground, Passivity
-from asperity.core.units import format_quantity, format_stiffness, round_down, round_up
+from asperity.core.units import count_text, format_quantity, format_stiffness, round_down, round_up
 from asperity.devices import WallTest
 from asperity.surface import Surface
 
@@ -352,7 +352,7 @@ def _wall_conditions(loop: DeviceLoop) -> str:
         return ""
     text = f" at {format_quantity(float(loop.wall_rate), 'Hz')}"
     if loop.delay is not None:
-        text += f" with {float(loop.wall_delay):g} samples of delay"
+        text += f" with {count_text(float(loop.wall_delay), 'sample')} of delay"
     if loop.least_rate < loop.wall_rate:
         text += f"; at {format_quantity(float(loop.least_rate), 'Hz')} it is less in proportion"
     return text
