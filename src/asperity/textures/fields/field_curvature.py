@@ -11,7 +11,8 @@ coefficient, S H = S₀ H + (S - S₀) H₀ + (S - S₀)(H - H₀), and the last
 greatest factors of the cell; ∇S ∇Sᵀ is convex, and not less than g₀ ∇Sᵀ + ∇S g₀ᵀ - g₀ g₀ᵀ. What is
 left is linear or convex in the coefficients. The matrices of a run of cells of one column are
 computed together in vector registers, and the signs of their leading minors show that their
-eigenvalues are below the bounds found before.
+eigenvalues are below the bounds found before. The cells of which they do not are packed, and the
+product is formed on several of them together.
 
 The weights of coefficients are those of :func:`field_certificate.hull_weights`.
 """
@@ -41,7 +42,8 @@ KERNELS = Kernels(loops=("hull_batch",), iterates=True)
 SLACK = 1e-7
 # Rounding error of a minor, for second derivatives of about 1.
 MINOR_ROUNDING = 1e-14
-LANES = 32
+# Cells of which the product is formed together.
+LANES = 16
 
 
 def largest_eigenvalue_3x3(
@@ -410,7 +412,10 @@ def search_packed(
     marks: NDArray[np.uint8],
     field: FieldArguments,
 ) -> None:
-    """Raise the bounds by the first packed cells, or unmark those by which they are not raised."""
+    """Raise the bounds by the first packed cells, or unmark those by which they are not raised.
+
+    Where cells are marked, the bounds do not change.
+    """
     upper = bounds[0, 0]
     lower = bounds[1, 0]
     tests = marks.shape[0] > 0
