@@ -57,17 +57,18 @@ def is_border(border: Border, shift: float = 1.0) -> bool:
 
 @cache
 def random_borders(count: int) -> list[Border]:
-    """Return random borders: of devices, laws, wavelengths, speeds and depths."""
+    """Return borders of each law: of random devices, wavelengths, speeds and depths."""
     draw, found = random.Random(7), list[Border]()
     while len(found) < count:
         depth = draw.choice([None, None, 10.0 ** draw.uniform(-4.3, -3.2)])
         conditions = RenderConditions(
             speed=10.0 ** draw.uniform(-1.7, -0.5),
-            min_stiffness=draw.choice([50.0, 100.0, 300.0]),
+            min_stiffness=draw.choice([5.0, 50.0, 300.0]),
             max_depth=depth,
         )
         device = asp.load_device(draw.choice(DEVICES))
-        case = WaveCase(draw.choice(LAWS), {}, device, conditions)
+        law = LAWS[len(found) % len(LAWS)]
+        case = WaveCase(law, {}, device, conditions)
         wavelength = 10.0 ** draw.uniform(math.log10(0.05e-3), math.log10(20e-3))
         (borders,) = find_borders(case, [wavelength])
         ends = [(borders.felt_from, True), (borders.felt_up_to, False)]
