@@ -223,11 +223,24 @@ def exclude_outside(count: int, work: FloatArray) -> None:
             work[3, k] = 1.0
 
 
-def pack_cell(k: int, lane: int, size: int, hull: FloatArray, packed: FloatArray) -> None:
-    """Copy the coefficients of cell k of a run to a lane of packed cells, (27, 10, LANES)."""
+def pack_cell(
+    k: int,
+    lane: int,
+    place: tuple[int, int, int],
+    rate: float,
+    size: int,
+    hull: FloatArray,
+    packed: FloatArray,
+    places: FloatArray,
+) -> None:
+    """Copy cell k of a run to a lane: its coefficients, (27, 10, LANES), place and rate."""
     for q in range(size):
         for t in range(10):
             packed[q, t, lane] = hull[q, t, k]
+    places[0, lane] = place[0]
+    places[1, lane] = place[1]
+    places[2, lane] = place[2] + k
+    places[3, lane] = rate
 
 
 def multiply_packed(
@@ -265,48 +278,16 @@ def multiply_packed(
             product[6, k] += s * along_z
 
 
-def has_corner_above(k: int, size: int, hull: FloatArray, bounds: FloatArray) -> bool:
-    """Return whether an eigenvalue of Hess T or its negative is above its bound at a corner."""
-    for q in range(size):
-        s = hull[q, 0, k]
-        if q % 3 == 1 or q // 3 % 3 == 1 or q // 9 == 1 or s <= 0.0:
-            continue
-        x = hull[q, 1, k]
-        y = hull[q, 2, k]
-        z = hull[q, 3, k]
-        xx = s * hull[q, 4, k] + x * x
-        xy = s * hull[q, 5, k] + x * y
-        xz = s * hull[q, 6, k] + x * z
-        yy = s * hull[q, 7, k] + y * y
-        yz = s * hull[q, 8, k] + y * z
-        zz = s * hull[q, 9, k] + z * z
-        upper = least_minor(bounds[0, 0], xx, xy, xz, yy, yz, zz)
-        lower = least_minor(bounds[1, 0], -xx, -xy, -xz, -yy, -yz, -zz)
-        if min(upper, lower) < -MINOR_ROUNDING:
-            return True
-    return False
-
-
 def is_undecided(
-    k: int,
-    place: tuple[int, int, int],
-    rate: float,
-    size: int,
-    hull: FloatArray,
-    work: FloatArray,
-    bounds: FloatArray,
-    marks: NDArray[np.uint8],
+    k: int, place: tuple[int, int, int], work: FloatArray, marks: NDArray[np.uint8]
 ) -> bool:
-    """Return whether the product must be formed on cell k of a run; unmark it if it is excluded."""
+    """Return whether the product must be formed on cell k of a run, and unmark it."""
     i, j, m = place
-    tests = marks.shape[0] > 0
-    if tests and marks[i, j, m + k] == 0:
-        return False
-    if work[3, k] > MINOR_ROUNDING:
-        if tests:
-            marks[i, j, m + k] = 0
-        return False
-    return not (tests and rate == 0.0 and has_corner_above(k, size, hull, bounds))
+    is_open = not work[3, k] > MINOR_ROUNDING
+    if marks.shape[0] > 0:
+        is_open = is_open and marks[i, j, m + k] > 0
+        marks[i, j, m + k] = 0
+    return is_open
 
 
 def least_minors(
@@ -412,26 +393,20 @@ def search_packed(
     marks: NDArray[np.uint8],
     field: FieldArguments,
 ) -> None:
-    """Raise the bounds by the first packed cells, or unmark those by which they are not raised.
-
-    Where cells are marked, the bounds do not change.
-    """
+    """Raise the bounds by the first packed cells, or mark the cells that would raise them."""
     upper = bounds[0, 0]
     lower = bounds[1, 0]
     tests = marks.shape[0] > 0
-    if tests:
-        for k in range(count):
-            marks[int(places[0, k]), int(places[1, k]), int(places[2, k])] = 0
     for n in range(starts.shape[0] - 1):
         multiply_packed(n, starts, pairs, weights, packed, product)
         least_minors(n, places, bounds, product, field)
         for k in range(count):
-            if product[7, k] > MINOR_ROUNDING:
+            place = (int(places[0, k]), int(places[1, k]), int(places[2, k]))
+            if product[7, k] > MINOR_ROUNDING or (tests and marks[place] > 0):
                 continue
             raise_bounds(n, k, places, packed, product, bounds, field)
             if tests:
-                if bounds[0, 0] > upper or bounds[1, 0] > lower:
-                    marks[int(places[0, k]), int(places[1, k]), int(places[2, k])] = 1
+                marks[place] = 1 if bounds[0, 0] > upper or bounds[1, 0] > lower else 0
                 bounds[0, 0] = upper
                 bounds[1, 0] = lower
 
@@ -499,14 +474,11 @@ def hull_batch(
                 expand_run(m, count, nodes, plane, upward, mixed, field.margin, hull)
                 measure_hulls(count, hull, work, size)
                 exclude_cells(m, count, rate, hull, bounds, work, size, field)
+                place = (j, i, m)
                 for k in range(count):
-                    if not is_undecided(k, (j, i, m), rate, size, hull, work, bounds, marks):
+                    if not is_undecided(k, place, work, marks):
                         continue
-                    pack_cell(k, lanes, size, hull, packed)
-                    places[0, lanes] = j
-                    places[1, lanes] = i
-                    places[2, lanes] = m + k
-                    places[3, lanes] = rate
+                    pack_cell(k, lanes, place, rate, size, hull, packed, places)
                     lanes += 1
                     if lanes == LANES:
                         search_packed(lanes, places, *terms, packed, product, bounds, marks, field)
