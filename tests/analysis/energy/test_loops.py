@@ -9,7 +9,12 @@ import pytest
 from scipy.integrate import quad
 
 from asperity.analysis import loop_work, worst_loop
-from asperity.analysis.energy.field_energy import TooSteepError, initial_panels, integrate
+from asperity.analysis.energy.field_energy import (
+    TooSteepError,
+    initial_panels,
+    integrate,
+    steady_work,
+)
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -207,3 +212,18 @@ def test_unreachable_tolerances_raise(tolerance: float) -> None:
     with pytest.raises(ParameterError) as caught:
         loop_work(surface, [[0.0, 0.0, -1e-4], [1e-4, 0.0, 0.0]], tolerance)
     assert caught.value.argument == "tolerance"
+
+
+def test_loop_of_a_surface_with_friction_is_not_answered_without_it() -> None:
+    """Its friction takes energy around the loop, which the field alone does not."""
+    texture, corners = Sinusoid(1e-4, 2e-3), np.array([[0, 0, -5e-4], [3e-3, 0, -5e-4]])
+    rubbing = Surface(texture, "C", stiffness=900.0, friction=0.4)
+    for work in (loop_work, steady_work):
+        with pytest.raises(ParameterError, match=r"surface has friction .* surface.trace\(path\)"):
+            work(rubbing, corners)
+        assert work(Surface(texture, "C", stiffness=900.0), corners) == pytest.approx(
+            0.0, abs=1e-18
+        )
+    path = np.concatenate([np.linspace(*corners, 2001), np.linspace(*corners[::-1], 2001)[1:]])
+    force = rubbing.trace(path)
+    assert np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(path, axis=0)) < -0.2e-3

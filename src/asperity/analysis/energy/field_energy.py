@@ -210,8 +210,9 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
         W [J].
 
     Raises:
-        ParameterError: for another shape, fewer than 2 vertices, values that are not finite, or a
-            tolerance that is not positive.
+        ParameterError: for another shape, fewer than 2 vertices, values that are not finite, a
+            tolerance that is not positive, or a surface with friction beside its law: its work is
+            the sum of force times step along :meth:`Surface.trace`.
 
     Reference:
         The paper's (12), (27), (29) and Fig. 3.
@@ -228,6 +229,9 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
     tolerance = check_positive("tolerance", tolerance)
     if len(corners) < 2:
         raise ParameterError("vertices", "must be at least 2 points (n, 3) [m]", len(corners))
+    if surface.contact_friction is not None:
+        reason = "has friction beside its law: sum force times step along surface.trace(path)"
+        raise ParameterError("surface", reason)
     ends = np.roll(corners, -1, axis=0)
     wave = shortest_wavelength(surface)
     if not surface.law.stateful:
