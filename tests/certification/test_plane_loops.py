@@ -88,9 +88,41 @@ def test_loop_follows_the_border_of_the_region_between_the_nodes(
     plane = np.array([[-1e-3, 0.0, -1e-3], [2e-3, 0.0, 0.0], [0.0, 0.0, 2e-3]])
     search._record_columns(-find_circulations(calls, plane, 80), plane)
     assert search.best is not None
-    # Half a cell at each end of the plane is left out.
-    area = 0.6e-3 * 2e-3 * 79.0 / 80.0
+    area = 0.6e-3 * 2e-3
     assert 0.95 * 1e3 * area < search.best.energy <= 1e3 * area
+
+
+def two_walls(points: FloatArray) -> FloatArray:
+    """Return the force of walls of 800 and 1200 N/m beside each other [N]."""
+    stiffness = np.where(points[:, 0] > 0.13e-3, 1200.0, 800.0)
+    return stiffness[:, None] * np.maximum(-points[:, 2:], 0.0) * [0.0, 0.0, 1.0]
+
+
+def roof(points: FloatArray) -> FloatArray:
+    """Return the force of a potential |x| (1 + z): it jumps, and no closed path gains [N]."""
+    x, _y, z = (1e3 * points).T
+    return np.column_stack([-0.2 * np.sign(x - 0.13) * (1.0 + z), 0.0 * x, -0.2 * np.abs(x - 0.13)])
+
+
+@pytest.mark.parametrize("cells", [32, 81])
+def test_gain_within_one_column_is_found(cells: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Into the soft wall, out of the stiff one beside it; a potential with an edge gains none."""
+    monkeypatch.setattr(loop_search, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    monkeypatch.setattr(RendererCalls, "rate", 1e5)
+    corner = np.array([1e-3, 1e-3, 0.5e-3])
+    plane = np.array([[-1e-3, 0.0, -0.5e-3], [2e-3, 0.0, 0.0], [0.0, 0.0, 1e-3]])
+    gains = []
+    for force in (two_walls, roof):
+        calls = RendererCalls(FunctionRenderer(force), Region(-corner, corner))
+        resolution = Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7)
+        search = loop_search.LoopSearch(calls, resolution, 0.0, seed=0)
+        circulations = find_circulations(calls, plane, cells)
+        for sign in (1.0, -1.0):
+            search._record_columns(sign * circulations, plane)
+        gains.append(0.0 if search.best is None else search.best.energy)
+    exact = 0.5 * (1200.0 - 800.0) * 0.5e-3**2
+    assert 0.9 * exact < gains[0] <= 1.000001 * exact
+    assert gains[1] == 0.0
 
 
 @pytest.mark.parametrize(("last", "counts"), [(0.1, False), (1.1, True)])

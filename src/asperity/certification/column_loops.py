@@ -91,10 +91,12 @@ class ColumnLoops:
     backwards: FloatArray
 
     def path(self, first: int, end: int) -> FloatArray:
-        """Return the loop through some columns [m], shape (m, 3)."""
+        """Return the loop through some columns, from side to side of them [m], shape (m, 3)."""
         way = np.arange(first, end)
-        columns = np.concatenate([way, way[::-1]]) + 0.5
-        heights = np.concatenate([self.forwards[way], self.backwards[way[::-1]]])
+        across = np.concatenate([[first], way + 0.5, [end]])
+        passed = np.concatenate([way[:1], way, way[-1:]])
+        columns = np.concatenate([across, across[::-1]])
+        heights = np.concatenate([self.forwards[passed], self.backwards[passed[::-1]]])
         shares = np.column_stack([columns / len(self.works), heights])
         return np.asarray(self.plane[0] + shares @ self.plane[1:])
 
