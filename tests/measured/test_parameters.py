@@ -222,6 +222,21 @@ def test_section_length_is_the_nesting_index() -> None:
     )
 
 
+def test_sections_are_as_long_as_the_nesting_index_in_the_middle_of_a_longer_trace() -> None:
+    """5.9 of them: peaks count in the five in the middle, each in its own section."""
+    line = np.zeros(591)
+    line[[40, 60, 190, 290, 390, 490, 550]] = MICRO * np.array([90, 1, 2, 3, 4, 5, 90])
+    mean = line.mean()
+    values = compute_parameters(line, (1e-6,), nesting=100e-6)
+    assert values["Rp"] == pytest.approx(3 * MICRO - mean, rel=1e-9)
+    assert values["Rt"] == pytest.approx(90 * MICRO, rel=1e-9)
+    short = compute_parameters(line[:149], (1e-6,), nesting=100e-6)  # from 24 to 124
+    assert short["Rz"] == pytest.approx(90 * MICRO, rel=1e-9)
+    assert compute_parameters(line[30:179], (1e-6,), nesting=100e-6)["Rz"] == pytest.approx(
+        MICRO, rel=1e-9
+    )
+
+
 def test_small_zigzag_makes_no_profile_elements() -> None:
     """A zigzag of 2 % of Rz is below the threshold of 10 % for profile elements."""
     x = np.arange(2001) * 1e-6

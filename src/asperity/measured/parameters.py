@@ -10,6 +10,7 @@ wave of n samples per period Sdq is too small by the factor sin(π/n)/(π/n): by
 
 from __future__ import annotations
 
+import itertools
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -18,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.measured.lengths import Pitch
 
 ParameterValues = Mapping[str, float | None]
@@ -119,12 +120,9 @@ def compute_parameters(
     if heights.ndim > 1:
         values = (q, a, high - low, high - mean, mean - low, skewness, kurtosis, gradient, ratio)
         return {p.symbol: value for p, value in zip(AREAL_PARAMETERS, values, strict=True)}
-    kind = "P"
-    sections = 1
-    if nesting is not None:
-        kind = "R"
-        sections = max(1, math.floor((len(heights) - 1) * pitch[0] / nesting * (1 + 1e-9)))
-    peak, pit = _mean_peak_and_pit(heights - mean, sections)
+    kind = "P" if nesting is None else "R"
+    ends = _section_ends(len(heights), math.inf if nesting is None else nesting / pitch[0])
+    peak, pit = _mean_peak_and_pit(heights - mean, ends)
     spacing = _element_spacing(heights - mean, pitch[0], _MIN_PEAK_FRACTION * (peak + pit))
     line = (q, a, peak + pit, peak, pit, high - low, skewness, kurtosis, spacing, gradient)
     return {f"{kind}{p.symbol}": value for p, value in zip(PROFILE_PARAMETERS, line, strict=True)}
@@ -182,9 +180,24 @@ def _sum_area_excess(square: FloatArray) -> float:
     return float((square / (1.0 + np.sqrt(1.0 + square))).sum())
 
 
-def _mean_peak_and_pit(z: FloatArray, sections: int) -> tuple[float, float]:
+def _section_ends(count: int, width: float) -> IntArray:
+    """Return the first point of each section of a profile, and the last one of the last.
+
+    As many sections of a width, in points, as there is room for, in the middle of the profile; or
+    the whole of one that is shorter.
+    """
+    sections = math.floor((count - 1) / width * (1 + 1e-9))
+    if sections == 0:
+        return np.array([0, count - 1])
+    first = 0.5 * (count - 1 - sections * width)
+    ends: IntArray = np.rint(first + width * np.arange(sections + 1)).astype(np.intp)
+    return ends
+
+
+def _mean_peak_and_pit(z: FloatArray, ends: IntArray) -> tuple[float, float]:
     """Return the means over the sections of their greatest heights and depths."""
-    parts = [part[~np.isnan(part)] for part in np.array_split(z, sections)]
+    sections = [z[first : last + 1] for first, last in itertools.pairwise(ends)]
+    parts = [part[~np.isnan(part)] for part in sections]
     parts = [part for part in parts if part.size]
     peaks = [float(part.max()) for part in parts]
     pits = [-float(part.min()) for part in parts]
