@@ -283,3 +283,16 @@ def test_a_plan_tells_how_far_it_is() -> None:
     shares: list[float] = []
     plan(design_of("comparison", repeats=1), 2.0, 3, simulations=4, progress=shares.append)
     assert shares == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_threshold_of_a_discrimination_is_named_an_increase() -> None:
+    """Its levels are counted from the reference: 83 µm above 50 µm, not of 83 µm."""
+    names = {}
+    for kind in ("detection", "discrimination"):
+        design = replace(design_of(kind, trials=20), unit="m")
+        result = analyse(design, records(design, 3))
+        names[kind] = {row["quantity"] for row in result.to_dict()["rows"]}
+    assert "threshold of texture.amplitude" in names["detection"]
+    increase = "threshold of the increase of texture.amplitude from the reference"
+    assert increase in names["discrimination"]
+    assert "threshold of texture.amplitude" not in names["discrimination"]

@@ -96,8 +96,11 @@ def score_thresholds(design: StudyDesign, answered: Answers) -> Score:
         len(design.conditions),
         lambda trials: levels.estimate_threshold(*level_answers(design, trials)),
     )
+    what = f"threshold of {design.options['level']}"
+    if levels.base > 0.0:
+        what = f"threshold of the increase of {design.options['level']} from the reference"
     return Score(
-        f"threshold of {design.options['level']}",
+        what,
         *cells,
         is_logarithmic=True,
         interval="posterior of the psychometric function",
