@@ -42,8 +42,13 @@ def test_full_stdout_gives_a_one_line_error() -> None:
 
 def test_closed_pipe_is_not_an_error() -> None:
     process = run("asperity devices --json - | true; echo ${PIPESTATUS[0]}")
-    assert int(process.stdout) in {0, 1, 141}  # before or after the reader left
+    assert int(process.stdout) in {0, 141}  # before or after the reader left
     assert not process.stderr
+
+
+def test_reader_that_ends_early_is_told_by_the_exit_code() -> None:
+    process = run("asperity devices | (exec 0<&-; sleep 1); echo ${PIPESTATUS[0]}")
+    assert (process.stdout, process.stderr) == ("141\n", "")
 
 
 @pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -153,7 +155,7 @@ def test_prepare_prints_the_same_table_and_json(call: Call, source: str, tmp_pat
     assert json.loads(out)["stages"][0]["name"] == "as read"
     code, _, err = call("prepare", source, *PLAIN, "-o", target, "--json", target, "--force")
     assert code == 2
-    assert "cannot both be written to" in err
+    assert "json must be another file than" in err
     before = Path(target).read_bytes()
     code, _, err = call("prepare", source, "-o", target)
     assert (code, "output exists" in err, Path(target).read_bytes() == before) == (2, True, True)
@@ -208,3 +210,39 @@ def test_cutoff_alone_asks_which(call: Call, source: str) -> None:
     code, out, err = call("show", source, "--cutoff", "0.8mm")
     assert (code, out) == (2, "")
     assert "did you mean '--s-cutoff' or '--l-cutoff'?" in err
+
+
+def test_output_is_not_written_over_the_file_that_is_read(
+    call: Call, source: str, tmp_path: Path
+) -> None:
+    before = Path(source).read_bytes()
+    link = tmp_path / "link.html"
+    link.symlink_to(source)
+    plate = tmp_path / "mine.toml"
+    plate.write_text('id = "mine"\nmax_stiffness = "1 kN/m"\n')
+    for arguments, name in (
+        (("show", source, *PLAIN, "--json", source), "json must be another file"),
+        (("show", source, *PLAIN, "--html", link), "html must be another file"),
+        (
+            ("compare", "knurl", "--laws", "W", "--device", plate, "--json", plate),
+            "json must be another file",
+        ),
+    ):
+        code, out, err = call(*map(str, arguments), "--force")
+        assert (code, out) == (2, "")
+        assert name in err
+    assert Path(source).read_bytes() == before
+    assert plate.read_text().startswith('id = "mine"')
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")
+def test_name_that_is_not_unicode_is_written_with_question_marks(
+    call: Call, source: str, tmp_path: Path
+) -> None:
+    name = os.fsdecode(os.fsencode(tmp_path) + b"/b\xff.npy")
+    Path(source).rename(name)
+    page, data = tmp_path / "b.html", tmp_path / "b.json"
+    code, _, err = call("show", name, *PLAIN, "--html", str(page), "--json", str(data))
+    assert (code, err) == (0, "")
+    assert "b?.npy" in page.read_text("utf-8")
+    assert json.loads(data.read_text("utf-8"))["stages"]

@@ -346,11 +346,16 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
 def main() -> None:
     """Run the command line; bad input is one line on standard error and exit code 2."""
     warnings.showwarning = _show_warning
+    stdout = sys.stdout
     try:
         size_limit()  # an invalid value is reported first
         cli(prog_name="asperity", standalone_mode=False)
     except click.Abort:
         raise KeyboardInterrupt from None  # reported by asperity.__main__
+    except SystemExit:
+        if sys.stdout is not stdout:  # click replaces it when its reader has ended
+            raise BrokenPipeError from None
+        raise
     except click.ClickException as error:
         if isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):
             error.show()  # the help of a group

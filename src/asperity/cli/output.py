@@ -20,6 +20,8 @@ from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import STANDARD_OUTPUT, check_output, json_text, text_digest, write_bytes
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from asperity.report.document.page import Page
 
 
@@ -178,9 +180,7 @@ class Outputs:
             page: the result for HTML and for the terminal.
             extra_line: printed after the result, if any.
         """
-        from rich.console import Console
-
-        console = Console(highlight=False)
+        console = _make_console()
         prints = STANDARD_OUTPUT not in {self.json, self.html, self.latex}
         if prints:  # first, as the files may not fit on the disk
             from asperity.report.document.terminal import print_page
@@ -281,7 +281,29 @@ def check_outputs(*, force: bool, **paths: str | None) -> None:
             place = "go to standard output" if path == STANDARD_OUTPUT else f"be written to {path}"
             raise ParameterError(taken[target], f"and {name} cannot both {place}")
         taken[target] = name
+        if name in _OUTPUT_PATHS:
+            _check_no_input(name, path)
         check_output(name, path, force=force)
+
+
+def _check_no_input(name: str, path: str) -> None:
+    """Refuse to write over a file that the command line names twice: the command reads it."""
+    words = [word.partition("=")[2] if word.startswith("--") else word for word in sys.argv[1:]]
+    if os.path.exists(path):
+        same = [word for word in words if os.path.exists(word) and os.path.samefile(word, path)]
+        if len(same) > 1:
+            raise ParameterError(name, "must be another file than the command reads", path)
+
+
+def _make_console() -> Console:
+    """Return a console of standard output; a reader that ends is an error, as for other output."""
+    from rich.console import Console
+
+    class PipedConsole(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return PipedConsole(highlight=False)
 
 
 def is_confirmed(question: str) -> bool:
@@ -315,4 +337,4 @@ def write_output(name: str, path: str, text: str) -> None:
     if path == STANDARD_OUTPUT:
         click.echo(text, nl=not text.endswith("\n"))
     else:
-        write_bytes(name, path, text.encode())
+        write_bytes(name, path, text.encode(errors="replace"))  # names of files may be no text

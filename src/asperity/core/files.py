@@ -246,7 +246,7 @@ def text_digest(text: str) -> str:
         >>> text_digest(json_text({"reach": 1.0}))
         '4a07eef8f6b6'
     """
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+    return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:12]
 
 
 def to_plain_data(value: Any, infinity: str | None = "inf") -> Any:
