@@ -296,7 +296,7 @@ _ALL = (
     scale_work(1.0, offset=1e-3),
     *(
         substitute_laws(**{law: other})
-        for law, other in zip("AABBCCCDEEFG", "BCACABWEADWA", strict=True)
+        for law, other in zip("AABBCCCDEEFG", "BCACABWEADAA", strict=True)
     ),
     substitute_laws(A="C", E="W"),
     replace_name("an observation that confirms it", "check_observation", _observed),
