@@ -14,7 +14,7 @@ import asperity as asp
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.core.cache import bypass_results
 from asperity.core.errors import ParameterError
-from asperity.devices import override_device
+from asperity.devices import override_device, parse_device
 from asperity.envelopes.envelope import Envelope, envelope
 from asperity.envelopes.wave_borders import (
     AMPLITUDE_RANGE,
@@ -108,6 +108,14 @@ def test_borders_do_not_depend_on_the_wavelengths_before(law: str) -> None:
         for name in ("felt_from", "felt_up_to", "firm_up_to", "gain_limit"):
             one, other = getattr(along, name), getattr(alone, name)
             assert one == pytest.approx(other, rel=3e-3, nan_ok=True), (name, alone)
+
+
+def test_law_without_a_finite_number_has_borders_without_a_wall_test() -> None:
+    data = {"damping": "2.34 N*s/m", "update_rate": "4 kHz", "delay_samples": 1}
+    case = WaveCase("D", {}, parse_device(data, "rig"), RenderConditions())
+    (borders,) = find_borders(case, [8e-3])
+    assert math.isinf(borders.gain_limit)
+    assert borders.firm_up_to > 0.0
 
 
 def test_borders_of_the_paper_are_closed_forms() -> None:

@@ -137,7 +137,9 @@ class Trial:
     @property
     def wall(self) -> float:
         """K₀ over q times the least stiffness: limit 5 of the paper holds from 1 on."""
-        wall = self.recommended.wall_stiffness or math.inf
+        wall = self.recommended.wall_stiffness
+        if wall is None:
+            return math.inf
         return wall / (self.q.value * self.min_stiffness)
 
     def felt(self) -> float:

@@ -386,8 +386,8 @@ def buzz_bound(loop: DeviceLoop) -> BuzzBound | None:
     terms = None if loop.damping_gain is None else _buzz_terms(loop)
     if terms is None or loop.rate is None:
         return None
-    per_stiffness, fixed, gain, budget = terms
-    margin = budget - loop.stiffness * gain
+    per_stiffness, fixed, gain, budget, ceiling = terms
+    margin = min(budget - loop.stiffness * gain, ceiling)
     if margin <= 0:
         return None
     excess = max(loop.stiffness * per_stiffness + fixed, Fraction(0))
@@ -412,7 +412,8 @@ def buzz_limited_stiffness(loop: DeviceLoop, speed: float | None = None) -> floa
     """Return the greatest stiffness [N/m] at which :func:`buzz_bound` is at most a speed.
 
     With φ - f_c = a k + c and m = (G - g k)/T it is (v G - c/T)/(a/T + v g). Errors of force that
-    do not scale with k let it be c/(T G) at any stiffness: v is at least twice that.
+    do not scale with k let it be c/(T G) at any stiffness: v is at least twice that. On a smooth
+    wall with friction m is at most G less the part of κ that does not scale with k.
 
     Args:
         loop: the surface on the device; its stiffness does not count.
@@ -424,14 +425,21 @@ def buzz_limited_stiffness(loop: DeviceLoop, speed: float | None = None) -> floa
     terms = _buzz_terms(loop)
     if terms is None or loop.rate is None or terms[-1] <= 0:
         return None
-    per_stiffness, fixed, gain, budget = terms
-    v = max(Fraction(speed or buzz_goal(loop.device)), 2 * fixed * loop.rate / budget)
-    slope = per_stiffness * loop.rate + v * gain
-    return math.inf if slope == 0 else round_down_exactly((v * budget - fixed * loop.rate) / slope)
+    per_stiffness, fixed, gain, budget, ceiling = terms
+    v = max(Fraction(speed or buzz_goal(loop.device)), 2 * fixed * loop.rate / ceiling)
+    a = per_stiffness * loop.rate
+    c = fixed * loop.rate
+    limits = [((v * budget - c), a + v * gain), ((v * ceiling - c), a)]
+    stiffness = min([size / slope for size, slope in limits if slope > 0], default=None)
+    return math.inf if stiffness is None else round_down_exactly(stiffness)
 
 
-def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fraction] | None:
-    """Return (φ - f_c per stiffness, its fixed part, q⁺/2 + d q, the budget [N/m]), if known."""
+def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction] | None:
+    """Return the parts of a buzz, if they are known.
+
+    They are φ - f_c per stiffness, its fixed part, q⁺/2 + d q, the budget [N/m], and what m T is at
+    most: on a smooth wall the friction, which acts along other axes, takes of it alone.
+    """
     if loop.obstacle or loop.damping_gain is None or loop.delay is None:
         return None
     q = loop.weighted_gain(Fraction(0), Fraction(1), "upper")
@@ -443,11 +451,12 @@ def _buzz_terms(loop: DeviceLoop) -> tuple[Fraction, Fraction, Fraction, Fractio
     steps = friction_steps(loop)
     fixed = loop.force_step / 2 + virtual * loop.position_step - loop.friction
     per_stiffness = Fraction(q) * loop.position_step / 2
-    gain, budget = add_friction(
-        loop.surface, gain, loop.damping_gain - virtual, HALF + 3 * HALF * loop.known_delay
-    )
+    weight = HALF + 3 * HALF * loop.known_delay
+    whole = loop.damping_gain - virtual
+    gain, budget = add_friction(loop.surface, gain, whole, weight)
+    ceiling = min(budget, whole - weight * kappa)
     fixed += steps * kappa
-    return per_stiffness + steps * share, fixed, Fraction(gain), budget
+    return per_stiffness + steps * share, fixed, Fraction(gain), budget, ceiling
 
 
 def friction_steps(loop: DeviceLoop) -> Fraction:
