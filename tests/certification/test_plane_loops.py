@@ -133,7 +133,7 @@ def test_works_that_agree_by_chance_are_refined_once_more(
     calls = RendererCalls(FunctionRenderer(np.zeros_like), Region(-corner, corner))
     resolution = Resolution(0.0, (0.0, 0.0, 0.0), 0.0, 1e-7)
     search = loop_search.LoopSearch(calls, resolution, 0.0, seed=0)
-    works = iter([1.0, 1.05, 1.1, last])
+    works = iter([1.0, 1.05, 1.1, last, last])
     monkeypatch.setattr(search, "_turn_works", lambda _path: (np.array([next(works)]), np.zeros(1)))
     assert search.measure(np.eye(3)).counts is counts
 

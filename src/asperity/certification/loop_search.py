@@ -317,12 +317,12 @@ class LoopSearch:
     def measure(self, vertices: FloatArray) -> ClosedLoop:
         """Return the loop through vertices with its work at one, two and four times the points.
 
-        One that counts is measured at eight times the points, too: of many loops, some have three
-        works that agree by chance.
+        One that counts is measured at 8 and 16 times the points, too: of many loops, some have
+        three works that agree by chance, and some few have four.
         """
         loop = ClosedLoop(0.0, math.inf, polygon_length(vertices), vertices, self._turns)
         works: list[float] = []
-        for factor in (1, 2, 4, 8):
+        for factor in (1, 2, 4, 8, 16):
             path = subdivide(vertices, loop.length / (_LOOP_POINTS * factor), 2 * factor)
             turn_works, doubts = self._turn_works(path[None])
             works.append(float(turn_works[0]))

@@ -266,3 +266,18 @@ def test_mean_thrust_of_a_conservative_field_is_zero_over_a_period(periodic: boo
     profile = Profile(A * np.sin(2 * np.pi * x + 0.4), L / 16, periodic=periodic)
     loop = worst_loop(Surface(profile, "C", K, D))
     assert (loop.energy, loop.thrust) == (0.0, 0.0 if periodic else None)
+
+
+@pytest.mark.parametrize("letter", ["A", "B"])
+@pytest.mark.parametrize(("amplitude", "depth"), [(0.8e-3, 8e-8), (4e-3, 4e-9), (0.2e-3, 2e-9)])
+def test_shallow_region_of_a_high_texture_keeps_its_proved_bounds(
+    letter: str, amplitude: float, depth: float
+) -> None:
+    """Straight edges of the loop found pass deeper than the region: 2 k A D, k D² (1 - 1/S)."""
+    surface = Surface(Sinusoid(amplitude, 2e-3), letter, 1000.0, depth)
+    found = worst_loop(surface)
+    s = math.hypot(1.0, 2.0 * math.pi * amplitude / 2e-3)
+    exact = {"A": 2000.0 * amplitude * depth, "B": 1000.0 * depth**2 * (1.0 - 1.0 / s)}[letter]
+    sharp = 1000.0 * depth * {"A": math.sqrt(s * s - 1.0) / s, "B": (s - 1.0) / (s + 1.0)}[letter]
+    assert found.energy <= found.upper_per_period == pytest.approx(exact, rel=4e-2)
+    assert found.absorbing.found <= found.absorbing.upper == pytest.approx(sharp, rel=1e-6)

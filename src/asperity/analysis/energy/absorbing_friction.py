@@ -100,10 +100,12 @@ def find_absorbing_friction(
     best = AbsorbingFriction(0.0, residual_bound(surface), 0.0, np.zeros((0, 3)), planes)
     for path in paths:
         work = loop_work(surface, path, work_tolerance(surface))
-        density = abs(work) / polygon_length(path)
+        length = polygon_length(path)
+        # Straight edges of a loop may pass below the region, where more may be gained.
+        density = min(abs(work) / length, best.upper)
         if density > best.found:
             vertices = np.ascontiguousarray(path if work > 0.0 else path[::-1])
-            best = AbsorbingFriction(density, best.upper, abs(work), vertices, planes)
+            best = AbsorbingFriction(density, best.upper, density * length, vertices, planes)
     return best
 
 

@@ -118,9 +118,10 @@ def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
         upper = max(high for _low, high in bounds)
     if energy > upper:
         _check_against_bound(surface, line, vertices, energy)
+        energy = upper  # straight edges pass below the region, where more may be gained
     origin = LoopOrigin(LoopKind.CURL_BY_DEPTH, surface.clamped_depth)
     thrust = _mean_thrust(surface, line)
-    return Leak(energy, max(upper, energy), line, method, origin, vertices, thrust)
+    return Leak(energy, upper, line, method, origin, vertices, thrust)
 
 
 def _check_against_bound(
