@@ -281,9 +281,9 @@ def check_outputs(*, force: bool, **paths: str | None) -> None:
             place = "go to standard output" if path == STANDARD_OUTPUT else f"be written to {path}"
             raise ParameterError(taken[target], f"and {name} cannot both {place}")
         taken[target] = name
+        check_output(name, path, force=force)
         if name in _OUTPUT_PATHS:
             _check_no_input(name, path)
-        check_output(name, path, force=force)
 
 
 def _check_no_input(name: str, path: str) -> None:
