@@ -52,7 +52,7 @@ CEILINGS = {"A": 0.09, "E": 0.39}
 """Onset over K₀/q of the paper's pantograph held loosely, which is not among the random loops."""
 SEARCH_LOOPS, LOOPS = 500, 2000
 SEED = 20261124
-DURATION = 1.0  # [s] of the first run; one that still moves is extended to 64 times as long
+DURATION = 1.0  # [s] of the first run; one that still moves is extended to 256 times as long
 DELAYS = (0, 0, 1, 2, 6)
 MAX_GAIN = 50.0  # a law whose q is greater has no start to speak of
 CURVE_FACTORS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)

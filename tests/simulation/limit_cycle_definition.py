@@ -92,10 +92,10 @@ def lasts(run: Run, factor: float, threshold: float | None) -> bool | None:
 
 
 def may_last(run: Run, settling: bool, threshold: float | None, fed: bool) -> bool:
-    """Return whether a motion that settles as it does is felt after 64 spans, and is fed."""
+    """Return whether a motion that settles as it does is felt in a run 4 times as long, and fed."""
     part = np.array_split(run.position, 4)[3]
     change = velocity_spread(run) / velocity_spread(run, quarter=2)
-    # The middle of the last quarter of 64 spans is 7/8 (64 - 16) spans later, quarters of 4 spans.
+    # The middle of its last quarter is 7/8 (4 - 1) runs later: so many quarters of this run.
     left = min(change, 1.0) ** (42.0 / 4.0) if settling else 1.0
     speed, extent = left * velocity_spread(run), left * part.std(axis=0).sum()
     felt = felt_speed(speed, extent) if threshold is None else threshold

@@ -151,4 +151,4 @@ def test_heavy_hands_cycle_where_the_delay_rule_ends(
         tolerance=0.1,
         lowest=20.0,
     )
-    assert 0.85 * rule < onset.quiet < onset.cycling < 1.35 * rule
+    assert 0.9 * rule < onset.quiet < onset.cycling < 1.3 * rule

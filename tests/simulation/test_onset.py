@@ -90,6 +90,26 @@ def test_wall_onset_agrees_with_eigenvalues(delay: int) -> None:
     assert onset.low[2] <= -1e-3 < onset.high[2] < 0.1
 
 
+def test_heavy_hand_that_bounces_for_long_settles_on_a_cycle() -> None:
+    """It bounces down to 130 um at 24 kN/m, for longer than 64 durations; 22 kN/m is the limit."""
+    plant = Cartesian(2.51, 1.054)
+    servo = Servo(2e-5, delay=2)
+    hand = SpringHand(stiffness=(165.0, 165.0, 165.0), damping=0.055, force=(0.0, 0.0, -1.0))
+    for stiffness, cycles in ((21e3, False), (24e3, True)):
+        onset = find_onset(
+            WALL,
+            plant,
+            hand,
+            servo,
+            REST,
+            start=(0.0, 0.0, 1e-3),
+            starts=1,
+            lowest=stiffness,
+            highest=1.001 * stiffness,
+        )
+        assert math.isfinite(onset.cycling) is cycles
+
+
 def test_loop_that_never_cycles_has_infinite_onset() -> None:
     onset = find_onset(
         WALL, PLANT, HAND, SERVO, REST, duration=0.3, starts=1, lowest=10.0, highest=100.0

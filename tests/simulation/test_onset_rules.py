@@ -139,7 +139,7 @@ def test_felt_speed_beyond_the_curve_is_that_of_its_ends() -> None:
     assert ends[0] < slow
 
 
-@pytest.mark.parametrize(("supplied", "spans"), [(0.91, 1), (0.9, 3), (0.21, 3), (0.19, 2)])
+@pytest.mark.parametrize(("supplied", "spans"), [(0.91, 1), (0.9, 4), (0.21, 4), (0.19, 2)])
 def test_cycle_that_lasts_gains_nine_tenths_of_the_loss(supplied: float, spans: int) -> None:
     """Counted from quarter to quarter; less than a fifth is no cycle, the rest is run again."""
     last = make_segment(2.0, 3.0 + supplied, 4.0)
@@ -209,11 +209,11 @@ def test_quarters_are_split_as_by_numpy(rows: int) -> None:
         (((1.0, 1.1), (1.1, 1.0)), (16, 64), False),
         (((1.0, 1.1), (1.1, 1.1)), (16, 64), True),  # steady: no longer run needed
         (
-            ((9.0, 9.0), (9.0, 8.0), (9.0, 8.0), (9.0, 8.0)),
-            (16, 64, 256, 1024),
+            ((9.0, 9.0), *4 * [(9.0, 8.0)]),
+            (16, 64, 256, 1024, 4096),
             False,
         ),  # settling up to the longest run: it does not last
-        # So it is where it would not be felt after the longest.
+        # So it is where it would not be felt in the next run.
         (((9.0, 2.0), (2.0, 1.79), (2.0, 1.79)), (16, 64, 256), False),
         # A decrease of exactly a tenth does not count, nor one that would be it in a longer run.
         (((9.0, 2.0), (2.0, 1.9), (2.0, 1.8)), (16, 64, 256), True),

@@ -184,7 +184,7 @@ def find_onsets(
         nears: expected onset of each [N/m], or ``None``; see :func:`find_onset`.
         start: initial position of the handle [m], shape (3,); default: where the motion starts.
         velocity: initial velocity of the handle [m/s], shape (3,); default: at rest.
-        duration: duration of a run [s]; a run that still oscillates is extended, up to 64 times as
+        duration: duration of a run [s]; a run that still oscillates is extended, up to 256 times as
             long.
         starts: number of phases of the texture at which the handle starts.
         tolerance: width of the bracket over its lower end.

@@ -20,8 +20,9 @@ from asperity.perception.grip import Grip, load_grip
 from asperity.simulation.lanes import MAX_LANES, BatchSimulation, StopRule, Trajectory
 from asperity.simulation.trace import SegmentStatistics, StopReason, ends_of_quarters
 
-# A run that still oscillates is extended by these factors, up to the last one.
-DURATION_FACTORS = (1.0, 4.0, 16.0, 64.0)
+# A run that still oscillates is extended, again and again, up to the last of these factors.
+_EXTENSION = 4.0
+DURATION_FACTORS = tuple(_EXTENSION**times for times in range(5))
 # A motion whose spread in the last quarter of a run is below this share of that in the quarter
 # before is decaying: from the third factor on; in a shorter run it is one that decays as fast.
 _DECAY_RATIO = 0.9
@@ -84,10 +85,10 @@ def limit_cycle_rule(
     whole oscillations is counted as an error. A handle that swings or falls by itself is no limit
     cycle; a handle that leaves the workspace while it is fed is one, and so is a diverged run.
 
-    A run that still oscillates is extended, to 4, 16 and 64 times its duration, until it is clear
-    whether the motion lasts: it does if it decays by less than a tenth per quarter of 16 durations
-    and the texture supplies nine tenths of the loss at least. It does not if it is not fed, or
-    decays so that it would not be felt after 64 durations.
+    A run that still oscillates is extended, to 4, 16, 64 and 256 times its duration, until it is
+    clear whether the motion lasts: it does if it decays by less than a tenth per quarter of 16
+    durations and the texture supplies nine tenths of the loss at least. It does not if it is not
+    fed, or decays so that it would not be felt at the end of the next extension.
 
     Args:
         samples: number of samples of a run, by the factor of its duration.
@@ -134,7 +135,7 @@ def _verdict(
         return None
     left = 1.0
     if decays:
-        quarters = _QUARTERS_PER_RUN * (DURATION_FACTORS[-1] / factor - 1.0)
+        quarters = _QUARTERS_PER_RUN * (_EXTENSION - 1.0)
         left = (last.velocity_spread / before.velocity_spread) ** quarters
     is_fed = energies.most > _SUPPLY_SHARE * energies.taken
     if is_fed and _oscillates(_scaled(last, left), threshold):
