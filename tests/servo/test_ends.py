@@ -77,6 +77,10 @@ def test_lock_distinguishes_devices(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         pass
 
 
+def test_origin_has_either_sign() -> None:
+    assert Safety(origin=(0.0, -10e-3, 20e-3)).origin == (0.0, -10e-3, 20e-3)
+
+
 def test_passivity_damping_is_bounded_by_the_mass() -> None:
     touch = load_device("touch")  # 45 g
     check_passivity_damping(Safety(passivity_damping=45.0), touch, Servo(1e-3))

@@ -203,26 +203,17 @@ def to_surface(position: FloatArray, row: int, frame: FloatArray) -> float:
     return value
 
 
-def read_position(position: FloatArray, late: int, guards: Guards, device: object) -> Reading:
-    """Read the position of the handle; report one that is not finite, out of reach, or too late.
-
-    A late start [ns] is a fault before a force is computed: the loop may have been suspended.
-    """
-    limits, frame, _block = guards
+def read_position(position: FloatArray, guards: Guards, device: object) -> Reading:
+    """Read the position of the handle; report an error of the device or one that is not finite."""
+    frame = guards.frame
     code = device_read(position, device)
     if code != OK:
         return Reading(0.0, 0.0, 0.0, DEVICE, code)
     x = to_surface(position, 0, frame)
     y = to_surface(position, 1, frame)
     z = to_surface(position, 2, frame)
-    if not is_finite_vector(x, y, z):
-        return Reading(x, y, z, NOT_FINITE, OK)
-    ax = x - limits.centre_x
-    ay = y - limits.centre_y
-    az = z - limits.centre_z
-    far = ax * ax + ay * ay + az * az > limits.max_reach * limits.max_reach
-    cause = LATE_SAMPLE if late > limits.max_lateness else RUNNING
-    return Reading(x, y, z, WORKSPACE if far else cause, OK)
+    cause = RUNNING if is_finite_vector(x, y, z) else NOT_FINITE
+    return Reading(x, y, z, cause, OK)
 
 
 def write_force(
@@ -280,19 +271,32 @@ def guard_force(
     return GuardedForce(limited.x, limited.y, limited.z, ramp, energy, damping)
 
 
-def check_sample(servo: ServoState, force: GuardedForce, guards: Guards, texture: object) -> int:
-    """Return the fault of a sample, or ``RUNNING``; count a depth beyond the limit."""
+def check_sample(
+    servo: ServoState, force: GuardedForce, late: int, guards: Guards, texture: object
+) -> int:
+    """Return the fault of a sample, or ``RUNNING``; count a depth beyond the limit.
+
+    A late start [ns] is a fault at once: the loop may have been suspended.
+    """
     limits = guards.limits
     status = guards.block.status
-    cause = RUNNING
     depth = 0.0
     if servo.z < limits.safe_height:
         depth = probe_depth(servo.x, servo.y, servo.z, texture)
-    if depth > limits.max_depth:
+    is_deep = depth > limits.max_depth
+    if is_deep:
         status[DEEP_COUNT] += 1
         status[DEEPEST] = max(status[DEEPEST], int(1e12 * depth))
-        cause = DEPTH if limits.depth_is_fault else RUNNING
-    return cause if is_finite_vector(force.fx, force.fy, force.fz) else NOT_FINITE
+    ax = servo.x - limits.centre_x
+    ay = servo.y - limits.centre_y
+    az = servo.z - limits.centre_z
+    if ax * ax + ay * ay + az * az > limits.max_reach * limits.max_reach:
+        return WORKSPACE
+    if late > limits.max_lateness:
+        return LATE_SAMPLE
+    if not is_finite_vector(force.fx, force.fy, force.fz):
+        return NOT_FINITE
+    return DEPTH if is_deep and limits.depth_is_fault else RUNNING
 
 
 def finish_timing(

@@ -136,6 +136,6 @@ def trace_sample(
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
-def trace_timing(trace: object, lateness: int, duration: int) -> None:
+def trace_timing(trace: object, reading: Reading, lateness: int, duration: int) -> None:
     """Complete the row of a sample with its lateness and duration [ns]."""
     raise NotImplementedError  # the interface alone; the linker binds calls of it

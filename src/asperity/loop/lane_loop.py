@@ -223,7 +223,7 @@ def trace_sample(
     trace.counters[0] += 1
 
 
-def trace_timing(trace: LaneTrace, lateness: int, duration: int) -> None:
+def trace_timing(trace: LaneTrace, reading: Reading, lateness: int, duration: int) -> None:
     """Do nothing: there is no clock."""
 
 

@@ -47,7 +47,7 @@ def requested_end(
     return (FINISHED, True) if sample >= end_sample else (RUNNING, False)
 
 
-def read_position(position: FloatArray, late: int, guards: object, device: object) -> Reading:
+def read_position(position: FloatArray, guards: object, device: object) -> Reading:
     """Return the position of the handle."""
     code = device_read(position, device)
     cause = RUNNING if code == OK else DEVICE
@@ -66,7 +66,9 @@ def guard_force(
     return GuardedForce(servo.fx, servo.fy, servo.fz, 1.0, 0.0, 0.0)
 
 
-def check_sample(servo: ServoState, force: GuardedForce, guards: object, texture: object) -> int:
+def check_sample(
+    servo: ServoState, force: GuardedForce, late: int, guards: object, texture: object
+) -> int:
     """Return that no fault is detected."""
     return RUNNING
 

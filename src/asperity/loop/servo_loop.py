@@ -113,7 +113,7 @@ def run_sample(
     if is_released:
         return end, OK, state
     start = clock_wait_until(timing.due, clock)
-    reading = read_position(position, start - timing.due, guards, device)
+    reading = read_position(position, guards, device)
     cause = reading.cause
     code = reading.code
     in_contact = False
@@ -126,7 +126,7 @@ def run_sample(
         servo = servo_tick(before, settings, x, y, z, memory, texture, law)
         force = guard_force(force, before, servo, end != RUNNING, settings, guards)
         in_contact = probe_in_contact(servo.x, servo.y, servo.z, texture)
-        cause = check_sample(servo, force, guards, texture)
+        cause = check_sample(servo, force, start - timing.due, guards, texture)
     if cause != RUNNING:
         force = release_force(force)
     trace_sample(trace, timing.sample, reading, before, servo, force, in_contact, settings, device)
@@ -135,7 +135,7 @@ def run_sample(
         cause = DEVICE
         code = answer
     now = clock_now(timing.due, clock)
-    trace_timing(trace, start - timing.due, now - start)
+    trace_timing(trace, reading, start - timing.due, now - start)
     timing_fault, timing = finish_timing(timing, start, now, guards)
     if cause == RUNNING:
         cause = timing_fault

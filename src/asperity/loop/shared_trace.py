@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from asperity.core.compiled import FloatArray, IntArray, Kernels, store_release
 from asperity.kernels.tick import ServoSettings, ServoState
-from asperity.loop.interface import GuardedForce, Reading
+from asperity.loop.interface import RUNNING, GuardedForce, Reading
 
 KERNELS = Kernels(
     provides=("count_timing", "trace_sample", "trace_timing"), native=("store_release",)
@@ -94,10 +94,12 @@ def trace_sample(
     settings: ServoSettings,
     device: object,
 ) -> None:
-    """Write the row of a sample; see ``interface``.
+    """Write the row of a sample; see ``interface``. A sample that was not read has none.
 
     The applied force is the one that acts from this sample on, commanded a delay ago.
     """
+    if reading.cause != RUNNING:
+        return
     rows = trace.rows
     pending = trace.pending
     count = trace.status[ROW_COUNT]
@@ -126,8 +128,10 @@ def trace_sample(
     rows[row, 19] = servo.anchor_z
 
 
-def trace_timing(trace: SharedBlock, lateness: int, duration: int) -> None:
+def trace_timing(trace: SharedBlock, reading: Reading, lateness: int, duration: int) -> None:
     """Complete the row, and count it."""
+    if reading.cause != RUNNING:
+        return
     head = trace.status[ROW_COUNT]
     row = head % trace.rows.shape[0]
     trace.rows[row, 13] = 1e-9 * lateness

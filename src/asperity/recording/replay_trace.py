@@ -46,7 +46,7 @@ def trace_sample(
     trace.rows[row, 6] = servo.anchor_z
 
 
-def trace_timing(trace: ReplayTrace, lateness: int, duration: int) -> None:
+def trace_timing(trace: ReplayTrace, reading: Reading, lateness: int, duration: int) -> None:
     """Do nothing: there is no clock."""
 
 
