@@ -16,6 +16,7 @@ from asperity.surface import Surface
 
 _POINTS = 2048
 _NEAREST_POINTS = {True: 1024, False: 128}
+_PERIODS = 4
 _TOLERANCE = 1e-6
 _DOUBLING = math.log(2.0)
 _MAX_DOUBLINGS = 24
@@ -38,23 +39,30 @@ def mean_press(surface: Surface) -> float:
 
 
 def scan_force_peak(surface: Surface) -> float:
-    """Return the greatest magnitude of the force [N] at the points of that scan."""
-    return float(np.linalg.norm(_scan_forces(surface), axis=1).max())
+    """Return the greatest magnitude of the force [N] on that scan, forth and back, with friction.
+
+    A periodic texture is scanned over several periods, until friction has its full force.
+    """
+    points = _scan_points(surface)
+    line = surface.texture.scan_line()
+    if line.periodic:
+        period = np.append(line.length * line.direction, 0.0)
+        points = np.concatenate([points + k * period for k in range(_PERIODS)], axis=1)
+    paths = np.concatenate([points, points[:, ::-1]], axis=1)
+    return float(np.linalg.norm(surface.trace(paths.reshape(-1, 3)), axis=1).max())
 
 
 def _mean_force(surface: Surface) -> float:
-    return float(_scan_forces(surface)[:, 2].mean())
+    return float(surface.force(_scan_points(surface).reshape(-1, 3))[:, 2].mean())
 
 
-def _scan_forces(surface: Surface) -> FloatArray:
-    """Return the forces [N] on the scan at ``max_depth``, shape (n, 3)."""
+def _scan_points(surface: Surface) -> FloatArray:
+    """Return the points [m] of the scan at ``max_depth``, shape (lines, n, 3)."""
     count = _POINTS
     if surface.law.contact.requires_search:
         count = _NEAREST_POINTS[surface.texture.is_profile]
-    line = surface.texture.scan_line()
-    xy = parallel_line_points(surface.texture, line, count).reshape(-1, 2)
-    points = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
-    return surface.force(points)
+    xy = parallel_line_points(surface.texture, surface.texture.scan_line(), count)
+    return np.dstack([xy, np.full(xy.shape[:2], scan_height(surface))])
 
 
 def holds_at_any_press(surface: Surface) -> bool:

@@ -15,7 +15,7 @@ typedef struct @name@_facts {
     double max_depth;    /* down to which q and q_plus hold [m] */
     double q;            /* proved upper bounds; HUGE_VAL: there is none */
     double q_plus;
-    double max_force;    /* greatest force on a straight scan at max_depth [N] */
+    double max_force;    /* greatest force on a straight scan at max_depth, with friction [N] */
     double max_press;    /* mean normal force on it [N] */
     double friction;     /* coefficient [1]; 0 as the following without friction */
     double presliding_stiffness; /* [N/m] */

@@ -3,7 +3,7 @@
 #define @NAME@_Q_UPPER @q_upper@ /* upper bound of the change of force per metre, over k */
 #define @NAME@_MAX_EVALUATIONS @max_evaluations@ /* budget of surface evaluations per tick */
 #define @NAME@_Q_PLUS_UPPER @q_plus@ /* the same of its growth inwards */
-#define @NAME@_MAX_FORCE @max_force@ /* greatest force on a straight scan at max_depth [N] */
+#define @NAME@_MAX_FORCE @max_force@ /* greatest force on a straight scan at max_depth, with friction [N] */
 #define @NAME@_MAX_PRESS @max_press@ /* mean normal force on it [N] */
 #define @NAME@_HOLDS_DEEPER @holds_deeper@ /* 1: q and q_plus hold at any depth and press */
 #define @NAME@_FRICTION @friction@ /* coefficient [1] */
