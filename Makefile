@@ -7,7 +7,7 @@ ifeq ($(shell command -v $(PYTHON) 2>/dev/null),)
 PYTHON := python3
 endif
 
-.PHONY: demo test check compatibility dist dist-test docs bench mutants kernels lock clean help
+.PHONY: demo test check lint compatibility dist dist-test docs bench mutants kernels lock clean help
 
 help:  ## List the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 15
@@ -34,14 +34,15 @@ demo: $(VENV)/runtime  ## Set up, compare the laws on a bundled surface, write r
 test: $(VENV)/development  ## Set up and run the whole test suite
 	$(BIN)/python -m pytest -n auto
 
-check: $(VENV)/development  ## Lint, types, import layers, generated files fresh
+check: lint docs  ## Lint, types, import layers, generated files fresh, documentation
+	$(BIN)/python -m pytest -n 0 -q tests/docs/test_docs.py -k built_pages
+
+lint: $(VENV)/development  ## Lint, types, import layers, generated files fresh
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m asperity.derive.generate --check
-	$(MAKE) --no-print-directory docs
-	$(BIN)/python -m pytest -n 0 -q tests/docs/test_docs.py -k built_pages
 
 docs: $(VENV)/development  ## Build the documentation into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -j auto -b html docs docs/_build/html
