@@ -43,7 +43,7 @@ def test_prepared_file_is_saved_and_each_step_reported(
     assert (code, err) == (0, "")
     assert "2 pitch 2 µm x 3 µm as given" in flat(out)
     assert (
-        "4 filled 12 of 2000 missing points (0.6 %) by harmonic interpolation on the fitted"
+        "4 filled 12 missing points of 2000 (0.6 %) by harmonic interpolation on the fitted"
         in flat(out)
     )
     assert "(chosen from the sampling: 4 samples)" in flat(out)

@@ -59,7 +59,7 @@ def test_step_states_the_number_of_missing_points() -> None:
     steps = result.steps
     assert (
         steps[1]
-        == "filled 12 of 600 missing points (2 %) by harmonic interpolation on the fitted tilt"
+        == "filled 12 missing points of 600 (2 %) by harmonic interpolation on the fitted tilt"
     )
     assert prepare(surface(bumpy())).steps[1] == "no missing points"
 

@@ -473,7 +473,7 @@ def _fill_missing(
         return filled
     share = 100.0 * missing / heights.size
     base = (" about the mean", " on the fitted tilt", " on the fitted form")[min(form, 2)]
-    count = f"{missing} of {heights.size} missing points ({share:.2g} %)"
+    count = f"{missing} missing points of {heights.size} ({share:.2g} %)"
     steps.append(f"filled {count} by harmonic interpolation{base}")
     fill_in_place(heights, pitch)
     return filled
