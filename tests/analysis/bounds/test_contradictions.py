@@ -98,7 +98,9 @@ def test_crest_without_proved_bound_gives_a_sampled_number(monkeypatch: pytest.M
     """A search that ends without a bound raises no error and gives an infinite upper bound."""
     intact = search.supremum
     monkeypatch.setattr(
-        search, "supremum", lambda *arguments: replace(intact(*arguments), upper=math.inf)
+        search,
+        "supremum",
+        lambda *arguments, **options: replace(intact(*arguments, **options), upper=math.inf),
     )
     bound = characteristic_number(Surface(WAVES, "D", max_depth=3e-4))
     assert (bound.method, bound.upper) == ("sampled", math.inf)
