@@ -54,7 +54,7 @@ def test_curl_of_law_a_is_that_of_the_paper():
 
 
 CONSERVATIVE: dict[str, Law] = {
-    "hardening god-object": law("nearest", lambda c: c.depth**3 * c.normal),
+    "hardening god-object": law("nearest", lambda c: c.k * c.depth**3 * c.normal),
     "Hertz god-object": law("nearest", lambda c: c.k * c.depth ** sp.Rational(3, 2) * c.normal),
     "exponential height": law("vertical", lambda c: c.k * (sp.exp(c.depth) - 1) * c.w),
     "D by another root": law("nearest", lambda c: c.k * c.depth * c.w / c.w.norm()),

@@ -33,12 +33,12 @@ def test_generated_facts_equal_derived_facts(letter: str):
 
 
 def test_facts_of_user_defined_laws_are_derived():
-    square = Law("A", "square", "vertical", lambda c: c.depth**3 * c.w)
+    square = Law("A", "square", "vertical", lambda c: c.k * c.depth**3 * c.w)
     facts = law_facts(square)
     assert facts.conservative
     assert not facts.affine_in_depth
     assert facts.depends_on_surface
-    jumping = Law("J", "jump", "nominal", lambda c: (c.depth + 1) * c.position[0] * c.e_z)
+    jumping = Law("J", "jump", "nominal", lambda c: c.k * (c.depth + 1) * c.position[0] * c.e_z)
     facts = law_facts(jumping)
     assert not facts.vanishes_at_contact
     assert not facts.affine_in_depth  # the position varies with the depth

@@ -123,19 +123,19 @@ def test_functions_take_only_the_arguments_they_use():
     [
         (2, "depth*depth"),
         (4, "depth*depth*depth*depth"),
-        (-2, "1.0/(depth*depth)"),
+        (-2, "k/(depth*depth)"),
         (5, "depth**5"),
         (sp.Rational(1, 2), "math.sqrt(depth)"),
     ],
 )
 def test_small_powers_are_products(exponent: Any, printed: str):
-    source = law_source(Law("P", "power", "nominal", lambda c: c.depth**exponent * c.e_z))
+    source = law_source(Law("P", "power", "nominal", lambda c: c.k * c.depth**exponent * c.e_z))
     assert printed in source.split("def law_jacobian")[0]
 
 
 def test_powers_of_sums_keep_their_parentheses():
-    law = Law("P", "power", "nominal", lambda c: (c.depth + c.h - c.k) ** 3 * c.e_z)
-    expected = (VALUES["depth"] + VALUES["h"] - VALUES["k"]) ** 3
+    law = Law("P", "power", "nominal", lambda c: c.k * (c.depth + c.h - 2) ** 3 * c.e_z)
+    expected = VALUES["k"] * (VALUES["depth"] + VALUES["h"] - 2) ** 3
     assert call(law, "law_force")[2] == pytest.approx(expected, rel=1e-14)
 
 

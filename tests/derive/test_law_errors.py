@@ -16,6 +16,7 @@ from asperity.analysis import characteristic_number
 from asperity.contacts.symbols import ARGUMENT_ORDER, HXX, ContactSymbols
 from asperity.core.errors import LawError
 from asperity.derive.derivatives import derive, symbolic_force
+from asperity.derive.facts import law_facts
 from asperity.derive.generate import law_source
 from asperity.kernels import path_loop, stateful_loops
 from asperity.kernels.fuse import source_on_texture
@@ -58,6 +59,58 @@ def law(force: Formula, **options: Any) -> Law:
 )
 def test_force_that_is_not_symbolic_is_an_error(force: Formula):
     with pytest.raises(LawError, match=r"law V: its force is not a symbolic formula \("):
+        symbolic_force(law(force))
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        lambda c: 1000 * c.depth * c.w,
+        lambda c: (c.k * c.depth + 5 * c.depth) * c.w,
+        lambda c: c.k * c.depth * (1 + (c.k * c.depth) ** 2) * c.w,
+        lambda c: sp.tanh(c.k * c.depth) * c.e_z,
+    ],
+    ids=["constant", "sum", "stiffening in k", "saturating in k"],
+)
+def test_force_that_is_not_proportional_to_the_stiffness_is_an_error(force: Formula):
+    with pytest.raises(LawError, match="law V: force must be k times a formula without k"):
+        symbolic_force(law(force))
+
+
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [
+        (lambda c: c.k * sp.floor(c.depth) * c.e_z, "must have derivatives"),
+        (lambda c: c.k * sp.Mod(c.depth, 2) * c.e_z, "must have derivatives"),
+        (lambda c: c.k * sp.Piecewise((c.depth, c.depth < 1)) * c.e_z, "needs a last piece"),
+    ],
+    ids=["floor", "Mod", "open pieces"],
+)
+def test_force_without_derivative_or_value_is_an_error(force: Formula, words: str):
+    with pytest.raises(LawError, match=f"law V: .*{words}"):
+        symbolic_force(law(force))
+
+
+@pytest.mark.parametrize(
+    ("share", "vanishes"),
+    [
+        (lambda c: c.depth * sp.Min(1, 1 / c.depth), True),
+        (lambda c: c.depth * sp.Max(1, 1 / c.depth), False),
+        (lambda c: c.depth * sp.Piecewise((1, c.depth < 1), (1 / c.depth, True)), True),
+        (lambda c: c.depth * sp.Max(c.slope[0], 1 / c.depth), False),
+    ],
+)
+def test_saturated_force_is_taken_where_contact_begins(share: Formula, vanishes: bool):
+    assert law_facts(law(lambda c: c.k * share(c) * c.w)).vanishes_at_contact is vanishes
+
+
+def test_force_is_proportional_to_the_stiffness_in_any_form():
+    for force in (
+        lambda c: sp.sqrt(c.k**2) * c.depth * c.w,
+        lambda c: (c.k**2 * c.depth / c.k) * c.w,
+        lambda c: sp.Piecewise((c.k * c.depth, c.depth < 1e-4), (1e-4 * c.k, True)) * c.e_z,
+        lambda c: ((c.k + 1) * c.depth - c.depth) * c.w,
+    ):
         symbolic_force(law(force))
 
 

@@ -116,6 +116,8 @@ def symbolic_force(law: Law) -> Any:
     if force.has(sp.oo, -sp.oo, sp.zoo, sp.nan, sp.I):
         raise LawError(f"law {law.letter}: force must be real and finite, got {force.T}")
     _check_symbols(law, force)
+    _check_functions(law, force)
+    _check_stiffness(law, force)
     return force
 
 
@@ -147,6 +149,32 @@ def _check_symbols(law: Law, force: Any) -> None:
         )
 
 
+def _check_functions(law: Law, force: Any) -> None:
+    if force.has(sp.floor, sp.ceiling, sp.Mod):
+        raise LawError(
+            f"law {law.letter}: force must have derivatives, which floor, ceiling and Mod have not"
+        )
+    for pieces in force.atoms(sp.Piecewise):
+        if pieces.args[-1].cond != sp.true:
+            raise LawError(
+                f"law {law.letter}: sympy.Piecewise needs a last piece (value, True), which holds "
+                f"everywhere else, got {pieces}"
+            )
+
+
+def _check_stiffness(law: Law, force: Any) -> None:
+    rate = force.diff(sym.K)
+    rest = force.subs(sym.K, 0)
+    if rate.has(sym.K) or rest != sp.zeros(3, 1):
+        rate = sp.simplify(rate)
+        rest = sp.simplify(rest)
+    if rate.has(sym.K) or rest != sp.zeros(3, 1):
+        raise LawError(
+            f"law {law.letter}: force must be k times a formula without k, since limits and starts "
+            f"scale with the stiffness, got {force.T}"
+        )
+
+
 def _factor_entries(matrix: Any) -> Any:
     return matrix.applyfunc(lambda entry: sp.factor_terms(sp.powsimp(entry)))
 
@@ -155,6 +183,8 @@ PIECEWISE_FUNCTIONS = (
     *(sp.Piecewise, sp.Abs, sp.sign, sp.Max, sp.Min),
     *(sp.Heaviside, sp.floor, sp.ceiling),
 )
+# The depth at which the arguments of Min and Max are compared where contact begins.
+_JUST_INSIDE = sp.Rational(1, 10**40)
 # The depth at which a clamp evaluates the force while the probe moves deeper.
 _CLAMPED_DEPTH = sp.Symbol("clamped_depth", positive=True)
 
@@ -242,14 +272,28 @@ def _curl(jacobian: Any) -> Any:
 
 
 def vanishes_at_contact(force: Any) -> bool:
-    """Return whether a symbolic force vanishes where contact begins."""
-    zero = dict.fromkeys([DEPTH, *CONTACT_VECTOR], 0)
-    return bool(force.subs(zero).applyfunc(_canonical_form) == sp.zeros(3, 1))
+    """Return whether a symbolic force is proved to vanish where contact begins."""
+    start = _force_at_contact(force)
+    return start is not None and bool(start.applyfunc(_canonical_form) == sp.zeros(3, 1))
+
+
+def _force_at_contact(force: Any) -> Any:
+    """Return a force where contact begins, ``None`` if its formula has no value there."""
+    for extreme in force.atoms(sp.Min, sp.Max):
+        inside = extreme.subs(DEPTH, _JUST_INSIDE)
+        for argument in extreme.args:
+            if argument.subs(DEPTH, _JUST_INSIDE) == inside:
+                force = force.subs(extreme, argument)
+    try:
+        start = force.subs(dict.fromkeys([DEPTH, *CONTACT_VECTOR], 0))
+    except ValueError:  # SymPy compares infinity, as in Min(1, 1/depth)
+        return None
+    return None if start.has(sp.oo, -sp.oo, sp.zoo, sp.nan) else start
 
 
 def _is_normal_at_contact(law: Law, force: Any) -> bool:
-    start = force.subs(dict.fromkeys([DEPTH, *CONTACT_VECTOR], 0))
-    if not law.contact.is_determined_by_depth:
+    start = _force_at_contact(force)
+    if start is None or not law.contact.is_determined_by_depth:
         return vanishes_at_contact(force)
     across = start.cross(law.contact.derivatives().depth_gradient.T)
     return bool(across.applyfunc(_canonical_form) == sp.zeros(3, 1))

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import dblquad
 
 from asperity.analysis import loop_work
@@ -16,6 +17,7 @@ from asperity.analysis.energy.curl_columns import (
 )
 from asperity.analysis.energy.leak import in_plane_loop, orient_loop, worst_loop
 from asperity.core.errors import ParameterError
+from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -180,8 +182,6 @@ def test_column_polygon_leaves_out_the_widest_gap() -> None:
 @pytest.mark.parametrize("power", [2, 3])
 def test_leak_of_a_law_not_affine_in_depth_is_certified(power: int) -> None:
     """The curl of k δⁿ e_z/Dⁿ⁻¹ is n k δⁿ⁻¹ h'/Dⁿ⁻¹; its integral over a flank is 2A k D."""
-    from asperity.laws import Law
-
     law = Law(
         "Q",
         "power",
@@ -194,6 +194,35 @@ def test_leak_of_a_law_not_affine_in_depth_is_certified(power: int) -> None:
     assert loop.method == "certified"
     assert exact <= loop.upper_per_period <= exact * 1.01
     assert loop.energy == pytest.approx(exact, rel=1e-3)
+
+
+def test_force_that_jumps_where_contact_begins_gains_along_the_surface() -> None:
+    """Along e_x it is k s h' there, and constant below: in and out of a rising flank, 2 A k s."""
+    size = 2e-5
+    law = Law(
+        "Q",
+        "sandpaper",
+        "nominal",
+        lambda c: c.k * (-c.parameter("size") * c.tangential(c.slope) + c.depth * c.e_z),
+        parameters={"size": size},
+    )
+    surface = Surface(Sinusoid(A, L), law, K, D)
+    loop = worst_loop(surface)
+    assert (loop.method, loop.upper_per_period) == ("sampled", math.inf)
+    assert loop.energy == pytest.approx(2 * A * K * size, rel=1e-3)
+    assert loop_work(surface, loop.vertices) == pytest.approx(loop.energy, rel=1e-9)
+
+
+def test_errors_at_kinks_are_no_gain() -> None:
+    """A god-object whose pull saturates has a potential, but its curl is not proved to be zero."""
+    law = Law(
+        "Q",
+        "saturating",
+        "nearest",
+        lambda c: c.k * c.toward * sp.Piecewise((1, c.depth < 2e-4), (2e-4 / c.depth, True)),
+    )
+    loop = worst_loop(Surface(Sinusoid(A, 1e-3), law, K, 4e-4))
+    assert (loop.method, loop.energy, loop.absorbing.found) == ("sampled", 0.0, 0.0)
 
 
 def test_critical_speed_balances_the_leak_with_damping() -> None:

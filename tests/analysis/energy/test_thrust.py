@@ -88,7 +88,7 @@ def test_work_around_outlines_equals_their_estimates() -> None:
     ):
         assert outline_line is line
         assert estimate == pytest.approx(expected, rel=0.03)
-        _vertices, work = leak.orient_loop(surface, polygon, 1e-4)
+        _vertices, work = leak.orient_loop(surface, polygon)
         assert work == pytest.approx(expected, rel=0.01)
 
 

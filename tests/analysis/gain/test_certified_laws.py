@@ -215,6 +215,18 @@ def test_copy_of_a_shipped_law_has_the_same_number() -> None:
         check_bound(surface, bound, "norm", 1e-5)
 
 
+def test_number_of_a_law_that_uses_the_position_is_that_of_all_places() -> None:
+    law = user_law(
+        lambda c: c.k * c.depth * (1 + sp.sin(3000 * c.position[0]) / 2) * c.e_z, "nominal"
+    )
+    bound = characteristic_number(Surface(WAVE, law, max_depth=0.4e-3))
+    # f_z = k δ g: the norm of its gradient is |(δ g', g)|.
+    x = np.linspace(0.0, 2.0 * math.pi / 3000.0, 10_001)
+    gradient = np.hypot(0.4e-3 * 1500 * np.cos(3000 * x), 1.0 + np.sin(3000 * x) / 2)
+    assert bound.method == "sampled"
+    assert 0.99 * gradient.max() < bound.lower <= gradient.max() * (1.0 + 1e-9)
+
+
 def test_copy_of_law_d_is_certified_above_the_medial_axis_only() -> None:
     law = user_law(lambda c: c.k * c.toward, "nearest")
     radius = WAVE.period**2 / (4 * math.pi**2 * WAVE.amplitude)

@@ -216,7 +216,7 @@ class LawProblem(MatrixProblem):
     def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
         """See :class:`MatrixProblem`."""
         derivatives = self.cells.derivatives(coordinates)
-        known = self._surface, np.zeros((len(coordinates), 2))
+        known = self._surface, self.cells.to_plane(coordinates)
         return [
             contact_jacobians(*known, at.depth, derivatives, at.deflection, sliding=at.sliding)
             for at in self.contacts(coordinates)

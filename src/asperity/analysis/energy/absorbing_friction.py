@@ -28,6 +28,9 @@ LOOP_TOLERANCE = 1e-12
 """Relative error of the work of an edge."""
 NEAREST_TOLERANCE = 1e-4
 """The same where each force requires a closest-point search."""
+# Of the absolute work of a path: errors of a coarse integral, at kinks too, and of a fine one.
+_DOUBTFUL_SHARE = 1e-2
+_ROUNDING_SHARE = 1e-9
 # Ellipses that are compared and how many of the best are improved: on profiles and where each force
 # requires a closest-point search, and on other maps.
 _ELLIPSES = {True: (2048, 2), False: (16_384, 4)}
@@ -74,9 +77,21 @@ def region_floor(surface: Surface, xy: FloatArray) -> FloatArray:
     return np.asarray(heights - low)
 
 
-def work_tolerance(surface: Surface) -> float:
-    """Return the relative error to which the work of an edge is integrated."""
-    return NEAREST_TOLERANCE if surface.law.contact.requires_search else LOOP_TOLERANCE
+def path_work(surface: Surface, path: FloatArray) -> float:
+    """Return the work around a closed path [J].
+
+    Where each force requires a search the edges are integrated coarsely. If that is no more than
+    errors can be, they are integrated again, and what rounding can be is none.
+    """
+    if not surface.law.contact.requires_search:
+        return loop_work(surface, path, LOOP_TOLERANCE)
+    work = loop_work(surface, path, NEAREST_TOLERANCE)
+    edges = np.linalg.norm(np.roll(path, -1, axis=0) - path, axis=1)
+    scale = float(np.linalg.norm(surface.force(path), axis=1) @ edges)
+    if abs(work) > _DOUBTFUL_SHARE * scale:
+        return work
+    work = loop_work(surface, path, LOOP_TOLERANCE)
+    return work if abs(work) > _ROUNDING_SHARE * scale else 0.0
 
 
 def find_absorbing_friction(
@@ -99,7 +114,7 @@ def find_absorbing_friction(
     paths += [_improve(*start) for start in _best_ellipses(surface, line, count, groups)]
     best = AbsorbingFriction(0.0, residual_bound(surface), 0.0, np.zeros((0, 3)), planes)
     for path in paths:
-        work = loop_work(surface, path, work_tolerance(surface))
+        work = path_work(surface, path)
         length = polygon_length(path)
         # Straight edges of a loop may pass below the region, where more may be gained.
         density = min(abs(work) / length, best.upper)

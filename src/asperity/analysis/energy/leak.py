@@ -12,8 +12,8 @@ from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, 
 from asperity.analysis.energy import curl_columns
 from asperity.analysis.energy.absorbing_friction import (
     LOOP_TOLERANCE,
-    NEAREST_TOLERANCE,
     find_absorbing_friction,
+    path_work,
     region_floor,
 )
 from asperity.analysis.energy.closed_loops import AbsorbingFriction, Leak, LoopKind, LoopOrigin
@@ -35,6 +35,7 @@ from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
 from asperity.analysis.gain.theorems import residual_bound
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
+from asperity.derive.facts import law_facts
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
@@ -110,7 +111,17 @@ def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     line = lines[worst]
     sign = 1.0 if sides[worst][0] >= sides[worst][1] else -1.0
     vertices, energy = orient_loop(surface, curl_columns.curl_region_loop(surface, line, sign))
-    bounds = curl_columns.curl_integral_bounds(surface, line)
+    bounds = None
+    if law_facts(surface.law).vanishes_at_contact:
+        bounds = curl_columns.curl_integral_bounds(surface, line)
+    else:
+        loops = [(vertices, energy)]
+        for each in lines:
+            loops += [
+                orient_loop(surface, curl_columns.contact_loop(surface, each, sign))
+                for sign in (1.0, -1.0)
+            ]
+        vertices, energy = max(loops, key=lambda loop: loop[1])
     upper = math.inf
     method = "sampled"
     if bounds is not None:
@@ -154,13 +165,11 @@ def _check_against_bound(
         )
 
 
-def orient_loop(
-    surface: Surface, vertices: FloatArray, tolerance: float = LOOP_TOLERANCE
-) -> tuple[FloatArray, float]:
+def orient_loop(surface: Surface, vertices: FloatArray) -> tuple[FloatArray, float]:
     """Return a polygon in the orientation in which it gains energy, and its work [J]."""
     if len(vertices) < 2:
         return np.zeros((0, 3)), 0.0
-    work = loop_work(surface, vertices, tolerance)
+    work = path_work(surface, vertices)
     if work < 0.0:
         return np.ascontiguousarray(vertices[::-1]), -work
     return vertices, work
@@ -170,7 +179,7 @@ def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     """Return the loop around the curl of one sign within the distance max_depth of the surface."""
     outlines = [outline for line in lines for outline in _nearest_outlines(surface, line)]
     _estimate, polygon, line = max(outlines, key=lambda outline: outline[0])
-    vertices, energy = orient_loop(surface, polygon, NEAREST_TOLERANCE)
+    vertices, energy = orient_loop(surface, polygon)
     origin = LoopOrigin(LoopKind.CURL_BY_DISTANCE, surface.max_depth)
     thrust = _mean_thrust(surface, line)
     return Leak(energy, math.inf, line, "sampled", origin, vertices, thrust)
