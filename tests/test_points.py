@@ -107,6 +107,12 @@ def test_state_of_a_wrong_shape_is_refused() -> None:
         law_f.force(PROBE, (1.0, 0.0))
 
 
+def test_masked_values_are_refused() -> None:
+    heights = np.ma.masked_greater(np.arange(36.0).reshape(6, 6), 30.0)
+    with pytest.raises(asp.ParameterError, match="heights must have no masked values"):
+        asp.HeightMap(heights, 1e-4)
+
+
 def test_error_names_the_coordinate_that_is_not_finite() -> None:
     with pytest.raises(asp.ParameterError, match=r"must be finite \[m\]; the value at \[0, 2\]"):
         surface("C").force((0.0, 0.0, np.nan))

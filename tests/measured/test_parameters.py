@@ -226,10 +226,11 @@ def test_sections_are_as_long_as_the_nesting_index_in_the_middle_of_a_longer_tra
     """5.9 of them: peaks count in the five in the middle, each in its own section."""
     line = np.zeros(591)
     line[[40, 60, 190, 290, 390, 490, 550]] = MICRO * np.array([90, 1, 2, 3, 4, 5, 90])
-    mean = line.mean()
+    evaluated = line[45:546]
     values = compute_parameters(line, (1e-6,), nesting=100e-6)
-    assert values["Rp"] == pytest.approx(3 * MICRO - mean, rel=1e-9)
-    assert values["Rt"] == pytest.approx(90 * MICRO, rel=1e-9)
+    assert values["Rp"] == pytest.approx(3 * MICRO - evaluated.mean(), rel=1e-9)
+    assert values["Rt"] == pytest.approx(5 * MICRO, rel=1e-9)
+    assert values["Rq"] == pytest.approx(evaluated.std(), rel=1e-9)
     short = compute_parameters(line[:149], (1e-6,), nesting=100e-6)  # from 24 to 124
     assert short["Rz"] == pytest.approx(90 * MICRO, rel=1e-9)
     assert compute_parameters(line[30:179], (1e-6,), nesting=100e-6)["Rz"] == pytest.approx(

@@ -34,6 +34,11 @@ def test_linear_and_logarithmic_ranges() -> None:
     np.testing.assert_allclose(np.diff(np.log(np.array(periods, float))), math.log(400) / 10)
 
 
+def test_values_that_are_no_text_are_refused() -> None:
+    with pytest.raises(ParameterError, match=r"texture\.period must be a text, such as"):
+        plan({"texture.period": [1e-3, 2e-3]})  # type: ignore[dict-item]  # the error under test
+
+
 def test_the_last_key_changes_fastest() -> None:
     made = plan({"device": "touch,omega.3", "texture.period": "1mm,3mm,2 mm"})
     assert len(made) == 6

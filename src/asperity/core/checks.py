@@ -219,6 +219,8 @@ def _to_float_array(name: str, value: ArrayLike, shape_text: str, unit: str) -> 
         array = np.asarray(value)
     except (TypeError, ValueError):  # rows of different length
         array = np.array(None)
+    if np.ma.is_masked(value):
+        raise ParameterError(name, "must have no masked values: numpy.ma.filled(array, numpy.nan)")
     if array.dtype.kind not in "fiu" and array.size:
         raise ParameterError(name, f"must be numbers of shape {shape_text} [{unit}]")
     return np.ascontiguousarray(array, dtype=np.float64)

@@ -90,7 +90,8 @@ def compute_parameters(
 
     A map has those of :data:`AREAL_PARAMETERS`, a profile those of :data:`PROFILE_PARAMETERS`. The
     symbols of a profile begin with P (primary profile), or with R if the nesting index L of its
-    L-filter is given: its sections then have the length L, otherwise it is one section.
+    L-filter is given: it is evaluated over as many sections of the length L as there are, in its
+    middle, otherwise over one section.
 
     Args:
         heights: [m], shape (ny, nx) or (n,); NaN for missing points, not all.
@@ -109,6 +110,10 @@ def compute_parameters(
         >>> f"{wave['Sq']:.4f} {wave['Sa']:.4f} {wave['Sku']:.4f} {wave['Sdq']:.3f}"
         '0.7071 0.6364 1.5000 4.420'
     """
+    if heights.ndim == 1:
+        ends = _section_ends(len(heights), math.inf if nesting is None else nesting / pitch[0])
+        heights = heights[ends[0] : ends[-1] + 1]
+        ends = ends - ends[0]
     rows = np.atleast_2d(heights)
     steps = (pitch[0], pitch[-1])
     measured = rows[~np.isnan(rows)]
@@ -121,7 +126,6 @@ def compute_parameters(
         values = (q, a, high - low, high - mean, mean - low, skewness, kurtosis, gradient, ratio)
         return {p.symbol: value for p, value in zip(AREAL_PARAMETERS, values, strict=True)}
     kind = "P" if nesting is None else "R"
-    ends = _section_ends(len(heights), math.inf if nesting is None else nesting / pitch[0])
     peak, pit = _mean_peak_and_pit(heights - mean, ends)
     spacing = _element_spacing(heights - mean, pitch[0], _MIN_PEAK_FRACTION * (peak + pit))
     line = (q, a, peak + pit, peak, pit, high - low, skewness, kurtosis, spacing, gradient)

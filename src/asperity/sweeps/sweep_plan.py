@@ -145,6 +145,9 @@ def _parse_axes(
     sections: Mapping[str, Mapping[str, Any]], vary: Mapping[str, str], design: str
 ) -> tuple[dict[str, Argument], list[list[dict[str, Any]]]]:
     """Return the declarations of the varied keys, and the choices that are combined."""
+    for key, text in vary.items():
+        if not isinstance(text, str):
+            raise ParameterError(key, 'must be a text, such as "1mm,2mm"', text)
     declared = find_varied_arguments(sections, {key: text.split(",") for key, text in vary.items()})
     ranges: dict[str, Range] = {}
     axes: list[list[dict[str, Any]]] = []

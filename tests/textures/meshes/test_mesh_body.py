@@ -384,6 +384,9 @@ def test_automatic_resolution_reaches_the_goal() -> None:
     torus = to_body(trimesh.creation.torus(3 * MM, 1 * MM))
     field = bake_body(torus, 0.6 * MM, goal=BakeGoal(share=0.1))
     assert 0.05 < field.accuracy.share <= 0.1
+    # The mean force all around: nearly that of a wall of the same depth.
+    depths = np.array(field.accuracy.depths)
+    assert np.all(np.array(field.accuracy.presses)[:-1] > 0.95 * depths[:-1])
     small = bake_body(torus, 0.6 * MM, goal=BakeGoal(share=0.1, max_bytes=200_000))
     assert small.accuracy.share > 0.1
     assert small.bytes <= 200_000

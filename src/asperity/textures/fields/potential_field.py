@@ -38,7 +38,7 @@ class FieldAccuracy:
             surface. At the least of them the mean force is about 0.1 N at 3000 N/m.
         shares: RMS difference over the RMS of the texture's force at each of them: the exact force
             about its mean there.
-        presses: mean force at each of these depths [m]; of bodies, its norm.
+        presses: mean force at each of these depths [m]; of bodies, the mean of its norms.
         onset: greatest distance [m] from the surface at which contact was found to begin.
         onset_places: number of random places where it was measured.
         is_limited: whether the goal was missed, because no finer field has the size allowed.

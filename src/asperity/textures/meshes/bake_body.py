@@ -281,6 +281,9 @@ class _BodyPlan(bake.BakePlan):
         if not inside.any():
             raise ParameterError("max_depth", "finds no point inside the body", max_depth)
         self.set_probes(points[inside], rows[inside], depths)
+        # In the mean of forces all around a body they cancel.
+        sizes = np.linalg.norm(self.force, axis=1)
+        self.presses = np.bincount(self.rows, sizes) / np.bincount(self.rows)
         points = self.loops.surface_probes(np.full(bake.PROBES, bake.SHALLOW * max_depth))
         self.set_shallow(points[self.exact_depth(points) > 0.0])
 
