@@ -11,7 +11,7 @@ from tests.helpers.c_programs import as_exported, header, kernel_ticks, library,
 
 import asperity as asp
 from asperity.analysis import characteristic_number, one_sided_number, worst_loop
-from asperity.analysis.energy.press import holds_at_any_press
+from asperity.analysis.energy.press import holds_at_any_press, mean_press
 from asperity.analysis.energy.straight_scan import friction_scan
 from asperity.analysis.passivity import criteria
 from asperity.analysis.passivity.verdict import passivity
@@ -20,6 +20,7 @@ from asperity.devices import parse_device
 from asperity.kernels.loop_functions import drag_anchor_in_space
 from asperity.recording.recording import open_recording
 from asperity.rendering import bake_mesh
+from asperity.report.sentences.assumption_sentences import default_depth_text
 from asperity.simulation import Cartesian, PrescribedHand, Servo, Strokes, simulate
 from asperity.surface import Surface
 
@@ -57,6 +58,18 @@ def test_pressing_alone_feels_no_friction(body: Surface) -> None:
 def test_a_body_holds_down_to_its_depth_alone(body: Surface) -> None:
     """Its field ends within it, that of a surface does not."""
     assert not holds_at_any_press(body)
+
+
+def test_press_is_the_mean_where_the_body_is(body: Surface) -> None:
+    """On the cube, not beside it, where there is no force."""
+    plain = body.without_friction()
+    side = np.linspace(-1.5 * HALF, 1.5 * HALF, 301)
+    x, y = np.meshgrid(side, side)
+    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -plain.texture.depth_limit)])
+    forces = plain.force(points)[:, 2]
+    assert mean_press(plain) == pytest.approx(forces[forces != 0.0].mean(), rel=0.03)
+    assert forces.mean() < 0.6 * mean_press(plain)
+    assert default_depth_text(plain) == "Default max depth 300 µm: that of the field"
 
 
 def test_deflection_has_three_coordinates(body: Surface) -> None:

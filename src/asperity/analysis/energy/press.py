@@ -29,7 +29,7 @@ _LEAST_GAIN = 1.01
 
 
 def mean_press(surface: Surface) -> float:
-    """Return the mean of f_z [N] over the scan at ``max_depth``.
+    """Return the mean of f_z [N] over the scan at ``max_depth``; of a body, where there is contact.
 
     The scan runs at z = max h - max_depth, or -max_depth on the nominal contact, as in
     :func:`~asperity.analysis.energy.straight_scan.merit`; with that press a hand reaches
@@ -53,7 +53,10 @@ def scan_force_peak(surface: Surface) -> float:
 
 
 def _mean_force(surface: Surface) -> float:
-    return float(surface.force(_scan_points(surface).reshape(-1, 3))[:, 2].mean())
+    forces = surface.force(_scan_points(surface).reshape(-1, 3))[:, 2]
+    if surface.texture.is_body and forces.any():
+        forces = forces[forces != 0.0]  # nobody presses beside a body
+    return float(forces.mean())
 
 
 def _scan_points(surface: Surface) -> FloatArray:

@@ -51,6 +51,8 @@ SCOPE_SENTENCE = "Results concern energy and forces; they were not tested with p
 def default_depth_text(surface: Surface) -> str:
     """Return the default max_depth, in a sentence."""
     depth = format_quantity(surface.max_depth, "m")
+    if surface.max_depth == surface.texture.depth_limit:
+        return f"Default max depth {depth}: that of the field"
     return f"Default max depth {depth}: the peak-to-valley height, at most 1 mm"
 
 
