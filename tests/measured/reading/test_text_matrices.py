@@ -80,6 +80,24 @@ def test_separators_and_line_ends(tmp_path: Path, separator: str, end: str) -> N
     assert_unit_is_open(raw)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "z [um]\n5,00\n5,98\n6,10\n7,05\n",
+        "1,25,2,50,3,75\n1,50,2,05,3,00\n",
+        "1,25, 2,50\n1,50, 2,75\n1,02, 2,75\n1,50, 2,75\n",
+    ],
+)
+def test_commas_that_may_be_decimal_signs_are_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(SurfaceFileError, match="commas are decimal signs, or numbers begin with 0"):
+        read_text(tmp_path, text)
+
+
+def test_whole_numbers_between_commas_are_read(tmp_path: Path) -> None:
+    raw = read_text(tmp_path, "0,10,200\n7,0,5\n-3,4,0\n")
+    np.testing.assert_array_equal(raw.heights, [[0, 10, 200], [7, 0, 5], [-3, 4, 0]])
+
+
 @pytest.mark.parametrize("separator", ["\t", ";", " ", "; "])
 def test_decimal_comma(tmp_path: Path, separator: str) -> None:
     raw = read_text(tmp_path, matrix_text(separator, decimal=","))

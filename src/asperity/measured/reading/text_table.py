@@ -71,7 +71,8 @@ def find_table(text: str) -> TextTable:
     """Return the only block of numbers in a text.
 
     Raises:
-        SurfaceFileError: no numbers, rows of different length, or text between the rows.
+        SurfaceFileError: no numbers, rows of different length, text between the rows, or commas
+            that may be decimal signs.
     """
     # Some instruments end a line with two carriage returns.
     lines = re.split(r"(?<!\r)\r*\n|\r", text)
@@ -82,6 +83,8 @@ def find_table(text: str) -> TextTable:
         raise SurfaceFileError("no row of numbers")
     _check_other_blocks(blocks, chosen, dialect)
     block = blocks[chosen]
+    if dialect.separator == ",":
+        _check_commas(block)
     between = lines[block.line_numbers[0] : block.line_numbers[-1]]
     return TextTable(
         values=_drop_empty_columns(np.array(block.values).reshape(-1, block.width)),
@@ -170,6 +173,16 @@ def _detect_dialect(lines: list[str]) -> Dialect:
             best = dialect
             best_count = count
     return best
+
+
+def _check_commas(block: _Block) -> None:
+    """Refuse whole numbers between commas of which some begin with 0, as decimals after a comma."""
+    for number, text in zip(block.line_numbers, block.row_texts, strict=True):
+        if "." not in text and re.search(r"\d, *0\d", text):
+            raise SurfaceFileError(
+                f"line {number}: commas are decimal signs, or numbers begin with 0: separate "
+                "numbers by semicolons or tabs, or write decimal points"
+            )
 
 
 def _check_other_blocks(blocks: list[_Block], index: int, dialect: Dialect) -> None:
