@@ -279,14 +279,7 @@ def check_sample(
     A late start [ns] is a fault at once: the loop may have been suspended.
     """
     limits = guards.limits
-    status = guards.block.status
-    depth = 0.0
-    if servo.z < limits.safe_height:
-        depth = probe_depth(servo.x, servo.y, servo.z, texture)
-    is_deep = depth > limits.max_depth
-    if is_deep:
-        status[DEEP_COUNT] += 1
-        status[DEEPEST] = max(status[DEEPEST], int(1e12 * depth))
+    is_deep = count_depth(servo, guards, texture)
     ax = servo.x - limits.centre_x
     ay = servo.y - limits.centre_y
     az = servo.z - limits.centre_z
@@ -297,6 +290,20 @@ def check_sample(
     if not is_finite_vector(force.fx, force.fy, force.fz):
         return NOT_FINITE
     return DEPTH if is_deep and limits.depth_is_fault else RUNNING
+
+
+def count_depth(servo: ServoState, guards: Guards, texture: object) -> bool:
+    """Return whether a probe is deeper than the limit; count it."""
+    limits = guards.limits
+    status = guards.block.status
+    depth = 0.0
+    if servo.z < limits.safe_height:
+        depth = probe_depth(servo.x, servo.y, servo.z, texture)
+    if depth <= limits.max_depth:
+        return False
+    status[DEEP_COUNT] += 1
+    status[DEEPEST] = max(status[DEEPEST], int(1e12 * depth))
+    return True
 
 
 def finish_timing(

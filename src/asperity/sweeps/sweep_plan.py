@@ -127,6 +127,7 @@ def make_plan(
     if laws is not None:
         letters = tuple(law.letter for law in find_laws(laws))
     find_run(run).check_options(options or {}, letters)
+    _check_texts(vary)
     arguments, axes = _parse_axes(sections, vary, design)
     if not axes:
         raise ParameterError("vary", "is missing: KEY=a,b,c")
@@ -141,13 +142,16 @@ def make_plan(
     return SweepPlan(template, arguments, tuple(axes), dict(vary), design, scene)
 
 
+def _check_texts(vary: Mapping[str, str]) -> None:
+    for key, text in vary.items():
+        if not isinstance(text, str):
+            raise ParameterError(key, 'must be a text, such as "1mm,2mm"', text)
+
+
 def _parse_axes(
     sections: Mapping[str, Mapping[str, Any]], vary: Mapping[str, str], design: str
 ) -> tuple[dict[str, Argument], list[list[dict[str, Any]]]]:
     """Return the declarations of the varied keys, and the choices that are combined."""
-    for key, text in vary.items():
-        if not isinstance(text, str):
-            raise ParameterError(key, 'must be a text, such as "1mm,2mm"', text)
     declared = find_varied_arguments(sections, {key: text.split(",") for key, text in vary.items()})
     ranges: dict[str, Range] = {}
     axes: list[list[dict[str, Any]]] = []

@@ -256,35 +256,41 @@ def contact_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:
     """Return a loop through the surface where contact begins, vertices (n, 3) [m].
 
     For a law whose force does not vanish there: the force jumps, which is a curl in the surface
-    itself. From a column outside the loop gains -f·t per length at the surface, t its tangent, and
-    the integral of the curl down to the depth at which the column ends. Columns that lose are left
-    out.
+    itself. Columns that lose are left out.
     """
     along = np.linspace(0.0, line.length, _node_count(surface.texture, line) + 1)
     xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
-    tops = surface.law.contact.contact_height(surface.texture, xy)
+    bottom = _gaining_depths(surface, line, along, sign)
+    # Straight edges between the columns stay outside of the body.
+    bulge = surface.texture.bounds[1] * (line.length / (len(along) - 1)) ** 2 / 8.0
     step = surface.clamped_depth / _LAYER_COUNT
+    surface_z = surface.law.contact.contact_height(surface.texture, xy)
+    top = surface_z + (bulge if 0.0 < bulge < step else step)
+    low = np.where(bottom > 0.0, surface_z - bottom, top)
+    return column_polygon(xy, top, low, periodic=line.periodic)
 
-    def probes(depth: float) -> FloatArray:
-        return np.column_stack([xy, tops - depth])
 
-    slope = np.gradient(tops, along)
-    forces = surface.force(probes(_JUST_INSIDE * step))
+def _gaining_depths(surface: Surface, line: ScanLine, along: FloatArray, sign: float) -> FloatArray:
+    """Return the depths [m] down to which columns that begin outside gain most, 0 for a loss.
+
+    From a column outside a loop gains -f·t per length at the surface, t its tangent, and the
+    integral of the curl down to the depth at which the column ends.
+    """
+    xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
+    surface_z = surface.law.contact.contact_height(surface.texture, xy)
+    step = surface.clamped_depth / _LAYER_COUNT
+    forces = surface.force(np.column_stack([xy, surface_z - _JUST_INSIDE * step]))
+    slope = np.gradient(surface_z, along)
     gains = -sign * (forces[:, :2] @ line.direction + forces[:, 2] * slope)
     best = np.zeros(len(xy))
     bottom = np.zeros(len(xy))
     for layer in range(_LAYER_COUNT):
-        middle = probes((layer + 0.5) * step)
+        middle = np.column_stack([xy, surface_z - (layer + 0.5) * step])
         gains = gains + sign * step * plane_curl(surface.jacobian(middle), line)
         better = gains > best
         best[better] = gains[better]
         bottom[better] = (layer + 1) * step
-    # Straight edges between the columns stay outside of the body.
-    bulge = surface.texture.bounds[1] * (line.length / (len(along) - 1)) ** 2 / 8.0
-    lift = bulge if 0.0 < bulge < step else step
-    return column_polygon(
-        xy, tops + lift, np.where(bottom > 0.0, tops - bottom, tops + lift), periodic=line.periodic
-    )
+    return bottom
 
 
 def _node_count(texture: Texture, line: ScanLine) -> int:
