@@ -63,6 +63,11 @@ class Cells(ABC):
     def to_plane(self, coordinates: FloatArray) -> FloatArray:
         """Return the points of the plane [m], shape (n, 2), at coordinates (n, d)."""
 
+    @property
+    def are_places(self) -> bool:
+        """Whether coordinates are places of the plane, which :meth:`to_plane` returns quickly."""
+        return True
+
     def chunk_size(self) -> int:
         """Return the number of cells to evaluate at a time."""
         return CHUNK_SIZE
@@ -153,6 +158,11 @@ class ProductCells(Cells):
     def to_plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
         return self._base.to_plane(coordinates[:, : self._base.dimensions])
+
+    @property
+    def are_places(self) -> bool:
+        """See :class:`Cells`."""
+        return self._base.are_places
 
     def chunk_size(self) -> int:
         """See :class:`Cells`."""

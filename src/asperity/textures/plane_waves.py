@@ -350,6 +350,12 @@ class WaveCells(cells.Cells):
         result[:, _ODD] = np.cos(angles) @ self._odd
         return result
 
+    @property
+    def are_places(self) -> bool:
+        """See :class:`Cells`; more phases than the plane has coordinates are none."""
+        is_covered = self.dimensions <= np.linalg.matrix_rank(self._basis)
+        return self._extent is not None or bool(is_covered)
+
     def to_plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`; for more than two phases the nearest phases among many points."""
         if self._extent is not None:
@@ -357,7 +363,7 @@ class WaveCells(cells.Cells):
         if self.dimensions == 1:
             wave = self._basis[0]
             return np.ascontiguousarray(coordinates * (wave / (wave @ wave)))
-        if self.dimensions <= np.linalg.matrix_rank(self._basis):
+        if self.are_places:
             inverse = np.linalg.pinv(self._basis)
             return np.ascontiguousarray(coordinates @ inverse.T)
         return np.array([nearest_phases(self._basis, row) for row in coordinates])
@@ -385,7 +391,7 @@ def nearest_phases(basis: FloatArray, target: FloatArray, max_turns: int = 400) 
     points = phases @ np.linalg.pinv(basis[rows]).T
     miss = points @ basis[others].T - target[others]
     miss = np.abs(miss - 2.0 * math.pi * np.round(miss / (2.0 * math.pi))).max(axis=1)
-    return np.asarray(points[int(np.argmin(miss))])
+    return np.array(points[int(np.argmin(miss))])  # no view, which would hold all points
 
 
 def _independent_rows(basis: FloatArray, rank: int) -> list[int]:

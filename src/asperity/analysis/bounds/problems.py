@@ -29,6 +29,7 @@ from asperity.enclosures.cells import (
     cells_with_depth,
 )
 from asperity.enclosures.taylor import TaylorMath, TaylorModel, TaylorNumber
+from asperity.kernels.fuse import uses_position
 from asperity.laws import Law
 from asperity.surface import Surface
 
@@ -216,9 +217,13 @@ class LawProblem(MatrixProblem):
     def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
         """See :class:`MatrixProblem`."""
         derivatives = self.cells.derivatives(coordinates)
-        known = self._surface, self.cells.to_plane(coordinates)
+        xy = np.zeros((len(coordinates), 2))
+        if uses_position(self._surface.law) and self.cells.are_places:
+            xy = self.cells.to_plane(coordinates)
         return [
-            contact_jacobians(*known, at.depth, derivatives, at.deflection, sliding=at.sliding)
+            contact_jacobians(
+                self._surface, xy, at.depth, derivatives, at.deflection, sliding=at.sliding
+            )
             for at in self.contacts(coordinates)
         ]
 
