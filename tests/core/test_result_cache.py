@@ -186,12 +186,12 @@ def test_results_of_user_defined_textures_and_laws_are_not_shared() -> None:
         pass
 
     assert Mine(HEIGHTS, 1e-3).digest is None
-    law = Law("U", "own", "vertical", lambda c: (c.k * c.depth + c.k**2 * c.depth) * c.e_z)
-    nonlinear = Surface(WAVE, law, stiffness=2.0)  # not proportional to k
-    assert merit(nonlinear).ripple == pytest.approx(3.0 * merit(Surface(WAVE, "A")).ripple)
-    assert surface_cache.at_unit_stiffness(nonlinear) is nonlinear
-    stiffer = nonlinear.to_stiffness(3.0)
-    assert surface_cache.surface_content(nonlinear) != surface_cache.surface_content(stiffer)
+    law = Law("U", "own", "vertical", lambda c: 3 * c.k * c.depth * c.e_z)
+    own = Surface(WAVE, law, stiffness=2.0)
+    assert merit(own).ripple == pytest.approx(3.0 * merit(Surface(WAVE, "A")).ripple)
+    assert surface_cache.at_unit_stiffness(own) is own
+    stiffer = own.to_stiffness(3.0)
+    assert surface_cache.surface_content(own) != surface_cache.surface_content(stiffer)
 
 
 def test_every_shipped_law_is_proportional_to_the_stiffness() -> None:
