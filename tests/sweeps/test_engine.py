@@ -194,7 +194,7 @@ def test_a_full_disk_is_one_line_and_the_sweep_goes_on(
     _, outcomes = compute_cases(plan.template, [(0, plan.values(0)), (1, plan.values(1))])
     store.record(outcomes[:1])
     size = (tmp_path / "run" / CASES_FILE).stat().st_size
-    stream, store._stream = store._stream, _FullAfter(store._stream, 10)  # type: ignore[assignment]
+    stream, store._stream = store._stream, _FullAfter(store._stream, 10)  # type: ignore[assignment]  # a stand-in
     with pytest.raises(ParameterError, match=r"output cannot be written: No space left on device;"):
         store.record(outcomes[1:])
     assert 1 not in store

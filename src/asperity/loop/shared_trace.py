@@ -94,12 +94,10 @@ def trace_sample(
     settings: ServoSettings,
     device: object,
 ) -> None:
-    """Write the row of a sample; see ``interface``. A sample that was not read has none.
+    """Write the row of a sample; see ``interface``.
 
     The applied force is the one that acts from this sample on, commanded a delay ago.
     """
-    if reading.cause != RUNNING:
-        return
     rows = trace.rows
     pending = trace.pending
     count = trace.status[ROW_COUNT]
@@ -129,7 +127,7 @@ def trace_sample(
 
 
 def trace_timing(trace: SharedBlock, reading: Reading, lateness: int, duration: int) -> None:
-    """Complete the row, and count it."""
+    """Complete the row, and count it; a sample that was not read has none."""
     if reading.cause != RUNNING:
         return
     head = trace.status[ROW_COUNT]

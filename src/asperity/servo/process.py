@@ -206,7 +206,7 @@ class ServoProcess:
         if reason is EndReason.DIED and not self._has_started:
             return DeviceFault(reason, f"{text} when it started: {MAIN_GUARD_HINT}", rows)
         if len(rows):
-            text += f" at {rows[-1, 0]:.4g} s"
+            text += f" after {rows[-1, 0]:.4g} s"
         if reason in {EndReason.UNRESPONSIVE, EndReason.DIED}:
             return DeviceFault(reason, f"{text}. {self.driver.loss_notice}", rows)
         return DeviceFault(reason, f"{text}; the force was made zero", rows)

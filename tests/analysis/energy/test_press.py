@@ -10,7 +10,12 @@ import pytest
 
 import asperity as asp
 from asperity.analysis import characteristic_number
-from asperity.analysis.energy.press import depth_at_press, holds_at_any_press, mean_press
+from asperity.analysis.energy.press import (
+    depth_at_press,
+    holds_at_any_press,
+    mean_press,
+    scan_force_peak,
+)
 from asperity.analysis.passivity.device_loop import DeviceLoop
 from asperity.analysis.passivity.recommended_stiffness import (
     StiffnessRecommendation,
@@ -34,6 +39,22 @@ def mean_by_definition(texture: Texture, law: str, depth: float) -> float:
     top = surface.law.contact.extremes(texture)[1]
     points = np.column_stack([x, 0.0 * x, np.full(len(x), top - depth)])
     return float(surface.force(points)[:, 2].mean())
+
+
+def test_greatest_force_is_that_of_full_friction() -> None:
+    """Law F reaches it in the second period, and modulates it by its height."""
+    surface = Surface(Sinusoid(2e-4, 1e-3), "F", 800.0, 4e-4)
+    full = 800.0 * 4e-4 * math.hypot(1.0, 0.8 * (1.0 + 0.8) / 2.0)
+    assert scan_force_peak(surface) == pytest.approx(full, rel=1e-3)
+
+
+def test_greatest_force_is_that_of_either_direction() -> None:
+    """Up the gentle flank of a sawtooth, or down it."""
+    x = np.arange(64)
+    saw = asp.Profile(2e-4 * np.where(x < 48, x / 48, (64 - x) / 16), 2e-5, periodic=True)
+    mirrored = asp.Profile(saw.heights[::-1], 2e-5, periodic=True)
+    peaks = [scan_force_peak(Surface(one, "C", 1e3, 1e-4, friction=0.5)) for one in (saw, mirrored)]
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-3)
 
 
 @pytest.mark.parametrize("law", "WABCEFGH")

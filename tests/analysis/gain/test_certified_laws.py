@@ -25,10 +25,11 @@ from asperity.analysis.bounds.sampling import worst_deflection
 from asperity.analysis.gain.characteristic import curl_number
 from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
 from asperity.analysis.gain.proofs import largest_singular_value
+from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
-from asperity.textures import HeightMap, Profile, Sinusoid
+from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, plane_waves
 
 # --- the medial axis ------------------------------------------------------------------------------
 
@@ -215,16 +216,36 @@ def test_copy_of_a_shipped_law_has_the_same_number() -> None:
         check_bound(surface, bound, "norm", 1e-5)
 
 
+GRADED = user_law(
+    lambda c: c.k * c.depth * (1 + sp.sin(3000 * c.position[0]) / 2) * c.e_z, "nominal"
+)
+
+
 def test_number_of_a_law_that_uses_the_position_is_that_of_all_places() -> None:
-    law = user_law(
-        lambda c: c.k * c.depth * (1 + sp.sin(3000 * c.position[0]) / 2) * c.e_z, "nominal"
-    )
-    bound = characteristic_number(Surface(WAVE, law, max_depth=0.4e-3))
+    bound = characteristic_number(Surface(WAVE, GRADED, max_depth=0.4e-3))
     # f_z = k δ g: the norm of its gradient is |(δ g', g)|.
     x = np.linspace(0.0, 2.0 * math.pi / 3000.0, 10_001)
     gradient = np.hypot(0.4e-3 * 1500 * np.cos(3000 * x), 1.0 + np.sin(3000 * x) / 2)
     assert bound.method == "sampled"
-    assert 0.99 * gradient.max() < bound.lower <= gradient.max() * (1.0 + 1e-9)
+    assert bound.lower == pytest.approx(gradient.max(), rel=1e-6)
+
+
+def test_places_of_independent_phases_are_looked_up_for_witnesses_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each takes milliseconds."""
+    looked_up = []
+    intact = plane_waves.nearest_phases
+
+    def look_up(basis: FloatArray, target: FloatArray) -> FloatArray:
+        looked_up.append(target)
+        return intact(basis, target)
+
+    monkeypatch.setattr(plane_waves, "nearest_phases", look_up)
+    wave = np.array([2000.0, 1000.0])
+    waves = Fourier([1e-4, 4e-5], [wave, math.sqrt(2.0) * wave], [0.0, 0.3])
+    assert characteristic_number(Surface(waves, GRADED, max_depth=0.2e-3)).method == "sampled"
+    assert 1 <= len(looked_up) <= 10
 
 
 def test_copy_of_law_d_is_certified_above_the_medial_axis_only() -> None:

@@ -260,27 +260,26 @@ def contact_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:
     """
     along = np.linspace(0.0, line.length, _node_count(surface.texture, line) + 1)
     xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
-    bottom = _gaining_depths(surface, line, along, sign)
+    surface_z = surface.law.contact.contact_height(surface.texture, xy)
+    bottom = _gaining_depths(surface, line, xy, surface_z, sign)
     # Straight edges between the columns stay outside of the body.
     bulge = surface.texture.bounds[1] * (line.length / (len(along) - 1)) ** 2 / 8.0
-    step = surface.clamped_depth / _LAYER_COUNT
-    surface_z = surface.law.contact.contact_height(surface.texture, xy)
-    top = surface_z + (bulge if 0.0 < bulge < step else step)
+    top = surface_z + bulge + surface.clamped_depth / _LAYER_COUNT
     low = np.where(bottom > 0.0, surface_z - bottom, top)
     return column_polygon(xy, top, low, periodic=line.periodic)
 
 
-def _gaining_depths(surface: Surface, line: ScanLine, along: FloatArray, sign: float) -> FloatArray:
+def _gaining_depths(
+    surface: Surface, line: ScanLine, xy: FloatArray, surface_z: FloatArray, sign: float
+) -> FloatArray:
     """Return the depths [m] down to which columns that begin outside gain most, 0 for a loss.
 
     From a column outside a loop gains -f·t per length at the surface, t its tangent, and the
     integral of the curl down to the depth at which the column ends.
     """
-    xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
-    surface_z = surface.law.contact.contact_height(surface.texture, xy)
     step = surface.clamped_depth / _LAYER_COUNT
     forces = surface.force(np.column_stack([xy, surface_z - _JUST_INSIDE * step]))
-    slope = np.gradient(surface_z, along)
+    slope = np.gradient(surface_z, line.length / (len(xy) - 1))
     gains = -sign * (forces[:, :2] @ line.direction + forces[:, 2] * slope)
     best = np.zeros(len(xy))
     bottom = np.zeros(len(xy))
