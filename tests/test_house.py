@@ -223,7 +223,7 @@ def test_other_comparisons_are_ignored(text: str) -> None:
 # and press of the user, quick answers, platforms and first steps have added: 3 300 statements and
 # 1 000 lines by plan.
 
-MAX_STATEMENTS = 44_910
+MAX_STATEMENTS = 44_900
 """Statements of the package without docstrings; packing or unpacking lines does not change them."""
 
 MAX_OTHER_LINES = 7_566

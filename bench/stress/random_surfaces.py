@@ -19,7 +19,6 @@ from asperity.analysis.gain.characteristic import (
     curl_number,
     one_sided_number,
 )
-from asperity.analysis.gain.surface_cache import at_unit_stiffness
 from asperity.contacts.symbols import ContactSymbols
 from asperity.core.checks import FloatArray
 from asperity.laws import Law, find_law
@@ -367,8 +366,8 @@ def _witness_error(
     state: tuple[Any, ...] = ()
     if bound.deflection is not None:
         state = (np.array([bound.deflection]), np.array([bound.sliding]))
-    # Numbers of shipped laws are worked out at 1 N/m: another stiffness would round otherwise, by
+    # Numbers are worked out at 1 N/m: another stiffness would round otherwise, by
     # more than what is left of a curl where two derivatives cancel.
-    asked = at_unit_stiffness(surface)
+    asked = surface.to_stiffness(1.0)
     attained = measure(asked.jacobian([bound.at], *state) / asked.stiffness)
     return abs(float(attained[0]) / bound.lower - 1.0)

@@ -31,7 +31,7 @@ from asperity.analysis.energy.straight_scan import (
     scan_height,
     scan_line_along,
 )
-from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
+from asperity.analysis.gain.surface_cache import cached_result
 from asperity.analysis.gain.theorems import residual_bound
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
@@ -79,7 +79,7 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
         lambda unit: _find_worst_loop(unit, line, in_all_directions=direction is None),
         repr((key, direction is None)),
     )
-    return leak.scale(stiffness_factor(surface))
+    return leak.scale(surface.stiffness)
 
 
 def _find_worst_loop(surface: Surface, line: ScanLine, *, in_all_directions: bool) -> Leak:

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from asperity.analysis.energy.straight_scan import parallel_line_points, scan_height
-from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
+from asperity.analysis.gain.surface_cache import cached_result
 from asperity.analysis.gain.theorems import theorem_on
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
@@ -35,7 +35,7 @@ def mean_press(surface: Surface) -> float:
     :func:`~asperity.analysis.energy.straight_scan.merit`; with that press a hand reaches
     ``max_depth``.
     """
-    return cached_result("mean press", surface, _mean_force) * stiffness_factor(surface)
+    return cached_result("mean press", surface, _mean_force) * surface.stiffness
 
 
 def scan_force_peak(surface: Surface) -> float:

@@ -14,7 +14,7 @@ from asperity.analysis.energy.straight_scan import (
     scan_height,
     sliding_state,
 )
-from asperity.analysis.gain.surface_cache import cached_result, stiffness_factor
+from asperity.analysis.gain.surface_cache import cached_result
 from asperity.analysis.limits.limit_rules import LimitCase
 from asperity.analysis.limits.spectrum import (
     BANDS_PER_OCTAVE,
@@ -221,7 +221,7 @@ def wave_force_components(
     forces = cached_result(
         "wave forces", surface, lambda unit: compute(unit, spectrum, evaluate), *key
     )
-    return np.asarray(forces) * stiffness_factor(surface)
+    return np.asarray(forces) * surface.stiffness
 
 
 def _fit_waves(
